@@ -59,7 +59,8 @@ mod tests {
         let mut swapped = unit;
         swapped.swap(0, D - 1);
         assert_eq!(determinant(&swapped), -1.0);
-        let m: [Vector64<D>; D] = std::array::from_fn(|i| Vector64::from_fn(|r, _| ((3 * i + r * r + 1) % 7) as f64 - 2.5));
+        let m: [Vector64<D>; D] =
+            std::array::from_fn(|i| Vector64::from_fn(|r, _| ((3 * i + r * r + 1) % 7) as f64 - 2.5));
         let n = cross(&m[1..]);
         for edge in &m[1..] {
             assert!(n.dot(edge).abs() < 1e-12);

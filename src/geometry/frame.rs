@@ -50,8 +50,10 @@ mod tests {
         let up = Vector::<D>::from_fn(|r, _| f32::from(r == D - 1));
         let mut normals = vec![up, -up];
         normals.extend((0..40).map(|k| {
-            Vector::<D>::from_fn(|r, _| ((k * 7 + r * 13) % 11) as f32 - 4.9 + if r == D - 1 { 1e3 } else { 0.0 } * f32::from(k % 3 == 0))
-                .normalize()
+            Vector::<D>::from_fn(|r, _| {
+                ((k * 7 + r * 13) % 11) as f32 - 4.9 + if r == D - 1 { 1e3 } else { 0.0 } * f32::from(k % 3 == 0)
+            })
+            .normalize()
         }));
         for normal in normals {
             let frame = Frame::new(&normal);
