@@ -27,8 +27,9 @@ pub struct Cone<const D: usize> {
     bounds: [f64; D],
     /// The sign of the determinant of the columns, -1, 0 or 1.
     orientation: i32,
-    /// The determinant of the columns, rounded.
+    /// The determinant of the columns, rounded, and a bound on that rounding.
     determinant: f64,
+    determinant_bound: f64,
 }
 
 /// Where a ray meets a simplex.
@@ -36,6 +37,8 @@ pub struct Cone<const D: usize> {
 pub struct Crossing<const D: usize> {
     /// Distance along the ray, in lengths of its direction; above zero.
     pub t: f64,
+    /// A bound on the rounding error of `t`; infinite where rounding left no digit.
+    pub error: f64,
     /// Barycentric coordinates of the point: at least 0, their sum 1.
     pub barycentric: [f64; D],
 }
@@ -56,23 +59,22 @@ impl<const D: usize> Cone<D> {
         let mut bounds = [ROUNDING; D];
         for i in 0..D {
             let mut others = [Vector64::<D>::zeros(); 4];
-            let mut n = 0;
-            for j in (0..D).filter(|&j| j != i) {
+            for (n, j) in (0..D).filter(|&j| j != i).enumerate() {
                 others[n] = edges[j];
                 bounds[i] *= lengths[j];
-                n += 1;
             }
             // Moving column i to the front takes i transpositions.
             let normal = cross(&others[..D - 1]);
             normals[i] = if i % 2 == 0 { normal } else { -normal };
         }
         let determinant = normals[0].dot(&edges[0]);
-        let orientation = if determinant.abs() > bounds[0] * lengths[0] {
+        let determinant_bound = bounds[0] * lengths[0];
+        let orientation = if determinant.abs() > determinant_bound {
             if determinant > 0.0 { 1 } else { -1 }
         } else {
             determinant_sign(&columns)
         };
-        Self { columns, normals, bounds, orientation, determinant }
+        Self { columns, normals, bounds, orientation, determinant, determinant_bound }
     }
 
     /// Which side of the simplex's hyperplane the origin is on: -1, 0 (in it) or 1.
@@ -107,6 +109,15 @@ impl<const D: usize> Cone<D> {
         (0..D).all(|i| self.facet_sign(i, direction, &wide, norm1) * self.orientation >= 0)
     }
 
+    /// Whether the interior of the cone holds the direction; `None` where the direction is in the boundary of the
+    /// cone or in the hyperplane of one of its facets, or where the cone is flat.
+    pub fn strictly_contains(&self, direction: &Vector<D>) -> Option<bool> {
+        let wide = widen(direction);
+        let norm1 = wide.iter().map(|x| x.abs()).sum::<f64>();
+        let signs: [i32; D] = std::array::from_fn(|i| self.facet_sign(i, direction, &wide, norm1) * self.orientation);
+        if signs.contains(&0) { None } else { Some(signs.iter().all(|&s| s > 0)) }
+    }
+
     /// Distance and barycentric coordinates of the point where a direction within the cone meets its base, the
     /// simplex whose vertices are the heads of the columns.
     #[inline]
@@ -115,13 +126,19 @@ impl<const D: usize> Cone<D> {
         let sign = f64::from(self.orientation);
         let weights: [f64; D] = std::array::from_fn(|i| (self.normals[i].dot(&wide) * sign).max(0.0));
         let sum: f64 = weights.iter().sum();
-        if sum > 0.0 && self.determinant != 0.0 {
-            Crossing { t: self.determinant.abs() / sum, barycentric: weights.map(|w| w / sum) }
+        let norm1 = wide.iter().map(|x| x.abs()).sum::<f64>();
+        let sum_error = norm1 * self.bounds.iter().sum::<f64>();
+        let size = self.determinant.abs();
+        if sum > 2.0 * sum_error && size > 2.0 * self.determinant_bound {
+            let t = size / sum;
+            let error = 2.0 * t * (sum_error / sum + self.determinant_bound / size + f64::EPSILON);
+            Crossing { t, error, barycentric: weights.map(|w| w / sum) }
         } else {
             let (numerator, exact) = self.exact_weights(direction);
             let weights = exact.map(|w| w.estimate().abs());
             let sum: f64 = weights.iter().sum();
-            Crossing { t: numerator.estimate().abs() / sum, barycentric: weights.map(|w| w / sum) }
+            let t = numerator.estimate().abs() / sum;
+            Crossing { t, error: 8.0 * f64::EPSILON * t, barycentric: weights.map(|w| w / sum) }
         }
     }
 

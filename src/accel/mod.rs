@@ -1,0 +1,8 @@
+//! Bounding volume hierarchies over the simplices of a mesh, and the two questions asked of them: which simplex does
+//! a ray hit first, and does it hit any.
+
+mod bvh;
+mod tracer;
+
+pub use bvh::{Bvh, Node};
+pub use tracer::{Hit, Tracer};

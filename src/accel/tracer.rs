@@ -1,0 +1,98 @@
+//! Rays against a mesh.
+//!
+//! Whether a simplex is hit is decided by exact signs ([`Cone`]), so the answers here are those of testing every
+//! simplex in turn; the hierarchy only saves the work.
+
+use std::cmp::Ordering;
+
+use super::Bvh;
+use crate::geometry::{Aabb, Cone, Ray};
+use crate::mesh::Mesh;
+
+/// A mesh with the hierarchy over its simplices of positive measure.
+#[derive(Clone, Debug)]
+pub struct Tracer<'m, const D: usize> {
+    mesh: &'m Mesh<D>,
+    bvh: Bvh<D>,
+}
+
+/// The simplex that a ray hits first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit<const D: usize> {
+    /// Which one; of several at exactly the same distance the lowest index.
+    pub simplex: u32,
+    /// Distance along the ray, in lengths of its direction; above zero.
+    pub t: f64,
+    /// Barycentric coordinates of the point, in the order of the simplex's corners.
+    pub barycentric: [f64; D],
+}
+
+impl<'m, const D: usize> Tracer<'m, D> {
+    /// Builds the hierarchy.
+    pub fn new(mesh: &'m Mesh<D>) -> Self {
+        let bounds: Vec<Aabb<D>> = (0..mesh.simplices.len() as u32).map(|s| Aabb::of(mesh.corners(s).iter())).collect();
+        let mut solid: Vec<u32> = (0..mesh.simplices.len() as u32).collect();
+        solid.retain(|s| mesh.degenerate.binary_search(s).is_err());
+        Self { mesh, bvh: Bvh::build(solid, &bounds) }
+    }
+
+    /// The mesh it was made of.
+    pub fn mesh(&self) -> &'m Mesh<D> {
+        self.mesh
+    }
+
+    /// The hierarchy.
+    pub fn bvh(&self) -> &Bvh<D> {
+        &self.bvh
+    }
+
+    /// Whether the ray hits any simplex but `ignored` at a distance in `(0, limit]`.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray<D>, limit: f32, ignored: Option<u32>) -> bool {
+        self.bvh.any(ray, limit, |simplex| {
+            if ignored == Some(simplex) {
+                return false;
+            }
+            let cone = Cone::of_simplex(&ray.origin, &self.mesh.corners(simplex));
+            cone.contains(&ray.direction)
+                && (limit == f32::INFINITY || cone.crossing(&ray.direction).t <= f64::from(limit))
+        })
+    }
+
+    /// The simplex that the ray hits first, if any.
+    #[inline]
+    pub fn closest_hit(&self, ray: &Ray<D>) -> Option<Hit<D>> {
+        let mut best: Option<(Hit<D>, f64)> = None;
+        self.bvh.nearest(ray, f32::INFINITY, |simplex, limit| {
+            let cone = Cone::of_simplex(&ray.origin, &self.mesh.corners(simplex));
+            if !cone.contains(&ray.direction) {
+                return limit;
+            }
+            let crossing = cone.crossing(&ray.direction);
+            if let Some((hit, error)) = &best {
+                let order = if (crossing.t - hit.t).abs() > crossing.error + error {
+                    crossing.t.total_cmp(&hit.t)
+                } else {
+                    self.exact_order(ray, &cone, hit.simplex)
+                };
+                if order.then(simplex.cmp(&hit.simplex)) == Ordering::Greater {
+                    return limit;
+                }
+            }
+            let hit = Hit { simplex, t: crossing.t, barycentric: crossing.barycentric };
+            best = Some((hit, crossing.error));
+            // Rounded up, with room for what ties.
+            ((crossing.t + crossing.error) as f32) * (1.0 + 4.0 * f32::EPSILON)
+        });
+        best.map(|(hit, _)| hit)
+    }
+
+    /// Compares the distances of two hits exactly, as fractions.
+    #[cold]
+    fn exact_order(&self, ray: &Ray<D>, cone: &Cone<D>, other: u32) -> Ordering {
+        let other = Cone::of_simplex(&ray.origin, &self.mesh.corners(other));
+        let (a, b) = cone.exact_distance(&ray.direction);
+        let (c, d) = other.exact_distance(&ray.direction);
+        a.multiply(&d).add(&c.multiply(&b).negate()).sign().cmp(&0)
+    }
+}

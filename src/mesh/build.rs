@@ -1,0 +1,93 @@
+//! From surfaces to a mesh.
+
+use rayon::prelude::*;
+
+use super::{Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation};
+use crate::geometry::{Vector, is_degenerate, narrow};
+
+/// Largest magnitude of a coordinate: determinants of four of them, and their squares, stay far from overflow.
+const LARGEST: f64 = 1e30;
+
+/// Places surfaces side by side, then finds identities, orientations and normals.
+#[derive(Clone, Debug, Default)]
+pub struct MeshBuilder<const D: usize> {
+    mesh: Mesh<D>,
+    orientations: Vec<Option<Orientation<D>>>,
+    given_normals: Vec<Option<Vec<Vector<D>>>>,
+}
+
+impl<const D: usize> MeshBuilder<D> {
+    /// An empty scene.
+    pub fn new() -> Self {
+        Self { mesh: Mesh::default(), orientations: Vec::new(), given_normals: Vec::new() }
+    }
+
+    /// Adds an object and rounds it to `f32`.
+    pub fn add(
+        &mut self,
+        name: &str,
+        color: [f32; 3],
+        surface: &Surface<D>,
+        open: Orientation<D>,
+    ) -> Result<(), MeshError> {
+        let object = || name.to_owned();
+        let (first_vertex, first_simplex) = (self.mesh.vertices.len(), self.mesh.simplices.len());
+        for (vertex, point) in surface.vertices.iter().enumerate() {
+            if let Some(&value) = point.iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
+                return Err(MeshError::Coordinate { object: object(), vertex, value });
+            }
+        }
+        let count = surface.vertices.len();
+        for (cell, simplex) in surface.simplices.iter().enumerate() {
+            if let Some(&index) = simplex.iter().find(|&&v| v as usize >= count) {
+                return Err(MeshError::Index { object: object(), cell, index, count });
+            }
+        }
+        if let Some(found) = surface.normals.as_ref().map(Vec::len).filter(|&n| n != count) {
+            return Err(MeshError::NormalCount { object: object(), found, expected: count });
+        }
+        for (what, total) in
+            [("vertices", first_vertex + count), ("simplices", first_simplex + surface.simplices.len())]
+        {
+            if total >= u32::MAX as usize {
+                return Err(MeshError::TooMany { what, count: total });
+            }
+        }
+        if self.mesh.objects.len() == usize::from(u16::MAX) {
+            return Err(MeshError::TooManyObjects(self.mesh.objects.len() + 1));
+        }
+        self.mesh.vertices.extend(surface.vertices.iter().map(narrow));
+        self.mesh.simplices.extend(surface.simplices.iter().map(|s| s.map(|v| v + first_vertex as u32)));
+        self.mesh.objects.push(Object {
+            name: object(),
+            color,
+            vertices: first_vertex..self.mesh.vertices.len(),
+            simplices: first_simplex..self.mesh.simplices.len(),
+            components: 0,
+            closed_components: 0,
+        });
+        self.orientations.push(Some(open));
+        self.given_normals.push(surface.normals.as_ref().map(|n| n.iter().map(normals::unit).collect()));
+        Ok(())
+    }
+
+    /// The finished mesh.
+    pub fn finish(self) -> Mesh<D> {
+        let mut mesh = self.mesh;
+        mesh.identity = identity::identities(&mesh.vertices);
+        mesh.normals = vec![Vector::zeros(); mesh.vertices.len()];
+        mesh.degenerate =
+            (0..mesh.simplices.len() as u32).into_par_iter().filter(|&s| is_degenerate(&mesh.corners(s))).collect();
+        for (i, (open, given)) in self.orientations.into_iter().zip(self.given_normals).enumerate() {
+            let (vertices, simplices) = (mesh.objects[i].vertices.clone(), mesh.objects[i].simplices.clone());
+            let open = open.unwrap_or(Orientation::Input);
+            let (components, closed) = orientation::orient(&mut mesh, simplices.clone(), &open);
+            (mesh.objects[i].components, mesh.objects[i].closed_components) = (components, closed);
+            normals::set_vertex_normals(&mut mesh, vertices.clone(), simplices);
+            if let Some(given) = given {
+                mesh.normals[vertices].copy_from_slice(&given);
+            }
+        }
+        mesh
+    }
+}

@@ -1,0 +1,162 @@
+//! Occlusion files: `NAME.f32`, little-endian float32, one value a vertex in the mesh's vertex order and nothing else;
+//! and beside it `NAME.f32.yaml`, which says what they are the values of.
+
+use std::fmt::Write;
+
+use thiserror::Error;
+
+/// What stands beside an occlusion file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sidecar {
+    /// Values in the file.
+    pub count: usize,
+    /// The method's name in the pipeline.
+    pub method: String,
+    /// Rays a vertex; none for methods without.
+    pub samples: Option<u32>,
+    /// The pipeline's seed.
+    pub seed: u64,
+    /// Distance beyond which hits don't count; infinite if all do.
+    pub max_distance: f32,
+    /// Root mean square over the vertices of the standard error of each value.
+    pub error_estimate: f64,
+    /// The mesh's content hash.
+    pub mesh: String,
+    /// Name and version of the program.
+    pub program: String,
+}
+
+/// Why an occlusion file isn't one, or not that of this mesh.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[allow(missing_docs)]
+pub enum FileError {
+    #[error("it holds {found} bytes, but {count} values take {expected}; it is truncated, or belongs to another scene")]
+    Length { found: usize, expected: usize, count: usize },
+    #[error("value {index} is {value}; an ambient occlusion lies between 0 and 1")]
+    Value { index: usize, value: f32 },
+    #[error("its sidecar lacks `{0}`, or what it says there can't be read")]
+    Sidecar(&'static str),
+    #[error(
+        "it was computed for another mesh ({found} instead of {expected}); compute it again, or load it into the scene it belongs to"
+    )]
+    Mesh { found: String, expected: String },
+}
+
+/// The bytes of an occlusion file.
+pub fn encode(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+/// The values in an occlusion file for a mesh of `count` vertices.
+///
+/// # Errors
+/// If the length doesn't fit, or a value is not within [0, 1].
+pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<f32>, FileError> {
+    if bytes.len() != 4 * count {
+        return Err(FileError::Length { found: bytes.len(), expected: 4 * count, count });
+    }
+    let values: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    match values.iter().position(|v| !(0.0..=1.0).contains(v)) {
+        Some(index) => Err(FileError::Value { index, value: values[index] }),
+        None => Ok(values),
+    }
+}
+
+impl Sidecar {
+    /// As YAML.
+    pub fn to_yaml(&self) -> String {
+        let mut text = String::from("# What the values in the file of this name are.\n");
+        let mut line = |key: &str, value: &dyn std::fmt::Display| {
+            let _ = writeln!(text, "{key}: {value}");
+        };
+        line("count", &self.count);
+        line("method", &self.method);
+        if let Some(samples) = self.samples {
+            line("samples", &samples);
+        }
+        line("seed", &self.seed);
+        if self.max_distance.is_finite() {
+            line("max_distance", &self.max_distance);
+        }
+        line("error_estimate", &format!("{:.6}", self.error_estimate));
+        line("mesh", &self.mesh);
+        line("program", &self.program);
+        text
+    }
+
+    /// Reads what [`Self::to_yaml`] writes.
+    ///
+    /// # Errors
+    /// [`FileError::Sidecar`] names the first thing that is missing.
+    pub fn from_yaml(text: &str) -> Result<Self, FileError> {
+        let field = |key: &'static str| {
+            let value = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(':').map(str::trim));
+            value.filter(|v| !v.is_empty()).ok_or(FileError::Sidecar(key))
+        };
+        fn number<T: std::str::FromStr>(key: &'static str, value: &str) -> Result<T, FileError> {
+            value.parse().map_err(|_| FileError::Sidecar(key))
+        }
+        Ok(Self {
+            count: number("count", field("count")?)?,
+            method: field("method")?.to_owned(),
+            samples: field("samples").ok().map(|v| number("samples", v)).transpose()?,
+            seed: number("seed", field("seed")?)?,
+            max_distance: field("max_distance").map_or(Ok(f32::INFINITY), |v| number("max_distance", v))?,
+            error_estimate: number("error_estimate", field("error_estimate")?)?,
+            mesh: field("mesh")?.to_owned(),
+            program: field("program")?.to_owned(),
+        })
+    }
+
+    /// Refuses a file that belongs to another mesh.
+    pub fn check(&self, mesh_hash: &str, vertices: usize) -> Result<(), FileError> {
+        if self.count != vertices || self.mesh != mesh_hash {
+            return Err(FileError::Mesh { found: short(&self.mesh), expected: short(mesh_hash) });
+        }
+        Ok(())
+    }
+}
+
+fn short(hash: &str) -> String {
+    hash.chars().take(12).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sidecars_read_back_and_name_what_is_missing() {
+        let sidecar = Sidecar {
+            count: 8,
+            method: "sobol".into(),
+            samples: Some(256),
+            seed: u64::MAX,
+            max_distance: 0.1,
+            error_estimate: 0.0125,
+            mesh: "00ff".into(),
+            program: "ao4d 0.1.0".into(),
+        };
+        let text = sidecar.to_yaml();
+        assert_eq!(Sidecar::from_yaml(&text), Ok(sidecar.clone()));
+        let plain = Sidecar { samples: None, max_distance: f32::INFINITY, ..sidecar.clone() };
+        assert_eq!(Sidecar::from_yaml(&plain.to_yaml()), Ok(plain));
+        for key in ["count", "method", "seed", "error_estimate", "mesh", "program"] {
+            let without: String = text.lines().filter(|l| !l.starts_with(key)).map(|l| format!("{l}\n")).collect();
+            assert_eq!(Sidecar::from_yaml(&without), Err(FileError::Sidecar(key)));
+        }
+        assert!(sidecar.check("00ff", 8).is_ok());
+        assert!(sidecar.check("00fe", 8).is_err());
+        assert!(sidecar.check("00ff", 9).is_err());
+    }
+
+    #[test]
+    fn files_read_back_or_are_refused() {
+        let bytes = encode(&[0.0, 0.25, 1.0]);
+        assert_eq!(decode(&bytes, 3), Ok(vec![0.0, 0.25, 1.0]));
+        for length in 0..bytes.len() {
+            assert!(matches!(decode(&bytes[..length], 3), Err(FileError::Length { .. })));
+        }
+        assert!(matches!(decode(&encode(&[0.5, f32::NAN]), 2), Err(FileError::Value { index: 1, .. })));
+    }
+}
