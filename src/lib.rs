@@ -5,4 +5,5 @@ pub mod geometry;
 pub mod mesh;
 pub mod occlusion;
 pub mod progress;
+pub mod render;
 pub mod volume;

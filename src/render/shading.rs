@@ -1,0 +1,94 @@
+//! The ambient occlusion and the distance of what each voxel sees.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::{NOTHING, Picture};
+use crate::geometry::{Cone, Ray, Vector, Vector64, narrow, normal_of, widen};
+use crate::mesh::normals::unit;
+use crate::occlusion::{Cancelled, Settings, Site, ambient_occlusion};
+use crate::progress::Progress;
+
+/// Where the ambient occlusion of a visible point comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum Shading<'s> {
+    /// Nowhere: everything is open.
+    None,
+    /// The mean of the simplex's vertices' values (Djami 2021, 4.6.3).
+    Flat(&'s [f32]),
+    /// Interpolated between the simplex's vertices' values, by barycentric coordinates.
+    Smooth(&'s [f32]),
+    /// Computed at the point itself, on the side that faces the ray: slow, the reference for the other two.
+    Voxel(Settings),
+}
+
+/// What one voxel sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fragment {
+    /// The simplex, or [`NOTHING`].
+    pub simplex: u32,
+    /// Ambient occlusion there; 1 where nothing is.
+    pub ambient_occlusion: f32,
+    /// Distance from the eye; infinite where nothing is.
+    pub depth: f32,
+}
+
+impl Fragment {
+    /// A voxel that sees nothing.
+    pub const BACKGROUND: Self = Self { simplex: NOTHING, ambient_occlusion: 1.0, depth: f32::INFINITY };
+}
+
+/// Shades the visible simplices of some layers.
+pub(super) fn shade<const D: usize>(
+    picture: &Picture<D>,
+    layers: Range<usize>,
+    visible: &[u32],
+    progress: &dyn Progress,
+) -> Result<Vec<Fragment>, Cancelled> {
+    let [width, height, _] = picture.grid.dimensions;
+    let mut fragments = vec![Fragment::BACKGROUND; visible.len()];
+    let rows = fragments.par_chunks_mut(width).zip(visible.par_chunks(width)).enumerate();
+    rows.try_for_each(|(row, (fragments, visible))| {
+        if progress.cancelled() {
+            return Err(Cancelled);
+        }
+        let (j, k) = (row % height, layers.start + row / height);
+        for (i, (fragment, &simplex)) in fragments.iter_mut().zip(visible).enumerate() {
+            if simplex != NOTHING {
+                let number = (i + width * (j + height * k)) as u64;
+                *fragment = shade_voxel(picture, [i, j, k], number, simplex);
+            }
+        }
+        progress.advance(width as u64);
+        Ok(())
+    })?;
+    Ok(fragments)
+}
+
+fn shade_voxel<const D: usize>(picture: &Picture<D>, index: [usize; 3], number: u64, simplex: u32) -> Fragment {
+    let mesh = picture.tracer.mesh();
+    let ray = picture.camera.voxel_ray(&picture.grid, index);
+    let crossing = Cone::of_simplex(&ray.origin, &mesh.corners(simplex)).crossing(&ray.direction);
+    let corner = |values: &[f32], i: usize| f64::from(values[mesh.simplices[simplex as usize][i] as usize]);
+    let value = match &picture.shading {
+        Shading::None => 1.0,
+        Shading::Flat(values) => ((0..D).map(|i| corner(values, i)).sum::<f64>() / D as f64) as f32,
+        Shading::Smooth(values) => (0..D).map(|i| corner(values, i) * crossing.barycentric[i]).sum::<f64>() as f32,
+        Shading::Voxel(settings) => {
+            let corners = mesh.corners(simplex).map(|v| widen(&v));
+            let point = (0..D).fold(Vector64::zeros(), |p, i| p + corners[i] * crossing.barycentric[i]);
+            let site = Site::inside_simplex(narrow(&point), facing_normal(&corners, &ray), simplex);
+            ambient_occlusion(picture.tracer, &site, settings, number)
+        }
+    };
+    let depth = crossing.t * widen(&ray.direction).norm();
+    Fragment { simplex, ambient_occlusion: value.clamp(0.0, 1.0), depth: depth as f32 }
+}
+
+/// The simplex's unit normal on the side that the ray comes from.
+pub(super) fn facing_normal<const D: usize>(corners: &[Vector64<D>; D], ray: &Ray<D>) -> Vector<D> {
+    let normal = normal_of(corners);
+    let towards = normal.dot(&widen(&ray.direction)) > 0.0;
+    unit(&if towards { -normal } else { normal })
+}
