@@ -2,4 +2,5 @@
 
 pub mod geometry;
 pub mod mesh;
+pub mod progress;
 pub mod volume;

@@ -1,0 +1,33 @@
+//! How long work is told, and stopped, from outside.
+//!
+//! Occlusion and rendering can take minutes. They report through this small trait, which the caller implements: the
+//! program as a bar on a terminal, a test as a counter, most callers as [`Silent`]. The same trait carries the wish to
+//! stop, so that a loop that reports progress also hears Ctrl-C, at most one batch of work later. Nothing here may
+//! change a result: the bytes written are the same whoever watches.
+
+/// Who watches a piece of work. Methods take `&self` and are called from many threads at once.
+pub trait Progress: Sync {
+    /// A stage begins that consists of `total` steps (vertices, voxels, bytes); 0 where the number isn't known.
+    fn begin(&self, stage: &str, total: u64);
+
+    /// `steps` more steps of the current stage are done. Call it once a batch, not once a step.
+    fn advance(&self, steps: u64);
+
+    /// The current stage ended, whether done or given up.
+    fn end(&self);
+
+    /// Whether the work is to stop as soon as it can; ask once a batch.
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Watches nothing and never cancels.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _steps: u64) {}
+    fn end(&self) {}
+}
