@@ -2,5 +2,6 @@
 
 pub mod geometry;
 pub mod mesh;
+pub mod pipeline;
 pub mod progress;
 pub mod volume;
