@@ -1,10 +1,10 @@
 //! An object as a pipeline writes it.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 /// An object of a scene: one shape, and how it looks.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectSpec {
     /// What the object is called in messages and files.
@@ -14,7 +14,7 @@ pub struct ObjectSpec {
 }
 
 /// Simplices written out.
-#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SimplicesSpec {
     /// The points: as many numbers each as the scene has dimensions.

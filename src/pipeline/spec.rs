@@ -11,7 +11,7 @@ pub use super::object::ObjectSpec;
 use super::one_or_many::OneOrMany;
 
 /// A pipeline: named stages that turn a scene into images.
-#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "ao4d pipeline")]
 pub struct PipelineSpec {
@@ -24,7 +24,7 @@ pub struct PipelineSpec {
 }
 
 /// One stage: its kind, and its settings.
-#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StageSpec {
     /// Objects in space.
@@ -40,7 +40,7 @@ pub enum StageSpec {
 }
 
 /// Objects in space.
-#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// A name for later stages to refer to.
@@ -53,7 +53,7 @@ pub struct SceneSpec {
 }
 
 /// Ambient occlusion at the vertices of a scene: 1 is open, 0 fully occluded.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct OcclusionSpec {
     /// A name for later stages to refer to.
@@ -96,7 +96,7 @@ pub enum Method {
 }
 
 /// An image of a scene: a volume of voxels in 4D, a picture in 3D.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct RenderSpec {
     /// A name for later stages to refer to.
@@ -114,7 +114,7 @@ pub struct RenderSpec {
 }
 
 /// Where a scene is seen from. Vectors have as many numbers as the scene has dimensions.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
     /// `perspective` (default) or `parallel`.
@@ -158,7 +158,7 @@ pub enum Shading {
 }
 
 /// Files of an image. At least one of `vti`, `raw`, `vtu` and `png`.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct WriteSpec {
     /// A name for later stages to refer to.
@@ -226,7 +226,7 @@ pub enum Compression {
 }
 
 /// A ParaView state (a Python file) that shows images side by side.
-#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct ParaviewSpec {
     /// A name for messages.
