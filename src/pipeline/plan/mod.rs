@@ -111,6 +111,7 @@ pub enum StageRef {
     /// `writes[i]`
     Write(usize),
     /// `figures[i]`
+    #[serde(rename = "paraview")]
     Figure(usize),
 }
 
