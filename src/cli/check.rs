@@ -1,0 +1,26 @@
+//! `ao4d check`: everything short of running.
+
+use clap::Args;
+
+use super::console::Console;
+use super::options::PipelineOptions;
+use super::{Failure, Outcome};
+
+/// What `check` takes: the same as `run`, so that one word changes between the two.
+#[derive(Args, Debug)]
+pub struct Check {
+    #[command(flatten)]
+    options: PipelineOptions,
+    /// Print the plan as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Check {
+    pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
+        let (pipeline, _settings) = self.options.load(console)?;
+        let description = pipeline.plan.describe(&[]);
+        if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;
+        Ok(Outcome::Done)
+    }
+}

@@ -1,0 +1,131 @@
+//! The command line: one file a verb, and no logic that the library lacks.
+//!
+//! Exit codes: 0 done; 1 `compare` found a difference; 2 the command line or the pipeline is wrong, and nothing was
+//! run or written; 3 the run failed; 130 after Ctrl-C. Results go to stdout, progress and messages to stderr.
+
+mod check;
+mod compare;
+mod console;
+mod devices;
+mod info;
+mod options;
+mod run;
+mod schema;
+mod study;
+mod watch;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use console::Console;
+use options::Messages;
+
+/// Ambient occlusion in four dimensions, for ParaView.
+#[derive(Debug, Parser)]
+#[command(name = "ao4d", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(flatten)]
+    messages: Messages,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Run a pipeline and write its files
+    Run(run::Run),
+    /// Do everything short of running: print the plan, write nothing
+    Check(check::Check),
+    /// Measure error against time of the occlusion methods on a pipeline's scene
+    Study(study::Study),
+    /// Compare two volumes, meshes or occlusion files
+    Compare(compare::Compare),
+    /// Tell what a file holds
+    Info(info::Info),
+    /// List the OpenCL devices, and what this processor offers
+    Devices(devices::Devices),
+    /// Print the JSON Schema of a pipeline, for editors
+    Schema(schema::Schema),
+}
+
+/// How a verb ended well.
+pub enum Outcome {
+    /// All is done.
+    Done,
+    /// `compare` found a difference.
+    #[allow(dead_code)] // until `compare` has something to compare with
+    Different,
+}
+
+/// How a verb ended badly.
+pub enum Failure {
+    /// The command line or the pipeline is wrong; nothing was run or written.
+    Refused(Box<dyn std::error::Error>),
+    /// The run failed.
+    Failed(Box<dyn std::error::Error>),
+    /// Ctrl-C.
+    #[allow(dead_code)] // until `run` has something to interrupt
+    Cancelled,
+}
+
+impl Failure {
+    /// A refusal with a text of its own.
+    fn refused(message: impl Into<String>) -> Self {
+        Failure::Refused(message.into().into())
+    }
+}
+
+impl From<ao4d::pipeline::Error> for Failure {
+    fn from(error: ao4d::pipeline::Error) -> Self {
+        Failure::Refused(Box::new(error))
+    }
+}
+
+/// Parses the command line and does what it says.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(refusal) => {
+            // Help and version come this way too, with code 0. A closed pipe is no reason to fail.
+            let _ = refusal.print();
+            return ExitCode::from(u8::try_from(refusal.exit_code()).unwrap_or(2));
+        }
+    };
+    let console = Console::new(cli.messages);
+    let result = match cli.verb {
+        Verb::Run(run) => run.execute(&console),
+        Verb::Check(check) => check.execute(&console),
+        Verb::Study(study) => study.execute(&console),
+        Verb::Compare(compare) => compare.execute(&console),
+        Verb::Info(info) => info.execute(&console),
+        Verb::Devices(devices) => devices.execute(&console),
+        Verb::Schema(schema) => schema.execute(&console),
+    };
+    ExitCode::from(match result {
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::Different) => 1,
+        Err(Failure::Refused(error)) => {
+            console.error(error.as_ref());
+            2
+        }
+        Err(Failure::Failed(error)) => {
+            console.error(error.as_ref());
+            3
+        }
+        Err(Failure::Cancelled) => {
+            console.note("interrupted");
+            130
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,68 @@
+//! Options that several verbs share.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use ao4d::pipeline::{Backend, Pipeline, Settings};
+use clap::Args;
+
+use super::Failure;
+use super::console::Console;
+
+/// How much is said on stderr.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct Messages {
+    /// Say nothing but errors
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+}
+
+/// A pipeline, and how it is run.
+#[derive(Args, Debug)]
+pub struct PipelineOptions {
+    /// The pipeline's file
+    #[arg(value_name = "PIPELINE.yaml")]
+    pub pipeline: PathBuf,
+    /// Change a value for this run: occlusion.samples=64, ID.key=..., seed=3; an empty VALUE takes the key out
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Write into this folder instead of out/NAME
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// What computes occlusion: cpu, opencl, or opencl:PLATFORM.DEVICE
+    #[arg(long, value_name = "BACKEND", default_value = "cpu")]
+    pub backend: Backend,
+    /// How many threads to use [default: all]
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<NonZeroUsize>,
+    /// Compute again what is cached
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl PipelineOptions {
+    /// Reads and checks the pipeline, and prints its warnings.
+    pub fn load(&self, console: &Console) -> Result<(Pipeline, Settings), Failure> {
+        let settings = Settings { backend: self.backend, threads: self.threads, force: self.force };
+        if let Backend::OpenCl(_) = settings.backend {
+            return Err(Failure::refused(format!(
+                "--backend {}: not available in this version; use cpu",
+                self.backend
+            )));
+        }
+        let pipeline = Pipeline::load(&self.pipeline, &self.set, self.out.clone())?;
+        for warning in pipeline.warnings() {
+            console.warn(&warning);
+        }
+        Ok((pipeline, settings))
+    }
+}
+
+/// A sensible number of threads: more than this only costs memory.
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let number = text.parse::<NonZeroUsize>().ok().filter(|n| n.get() <= 1024);
+    number.ok_or_else(|| "expected a whole number from 1 to 1024".into())
+}

@@ -1,0 +1,80 @@
+//! Who watches a run: a bar on a terminal, lines with `-v`, and Ctrl-C.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use ao4d::progress::Progress;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::Failure;
+use super::console::Console;
+
+/// Reports to the console, and knows whether Ctrl-C was pressed.
+pub struct Watch<'a> {
+    console: &'a Console,
+    cancelled: Arc<AtomicBool>,
+    current: Mutex<Option<Current>>,
+}
+
+struct Current {
+    stage: String,
+    began: Instant,
+    bar: ProgressBar,
+}
+
+impl<'a> Watch<'a> {
+    /// Begins to listen for Ctrl-C. The first asks the run to stop and clean up, the second doesn't ask.
+    pub fn new(console: &'a Console) -> Result<Self, Failure> {
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&cancelled);
+        let handler = move || {
+            if flag.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+        };
+        ctrlc::set_handler(handler).map_err(|e| Failure::Failed(Box::new(e)))?;
+        Ok(Watch { console, cancelled, current: Mutex::new(None) })
+    }
+
+    fn current(&self) -> MutexGuard<'_, Option<Current>> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Progress for Watch<'_> {
+    fn begin(&self, stage: &str, total: u64) {
+        let bar = if self.console.bars() { bar(stage, total) } else { ProgressBar::hidden() };
+        *self.current() = Some(Current { stage: stage.to_owned(), began: Instant::now(), bar });
+    }
+
+    fn advance(&self, steps: u64) {
+        if let Some(current) = self.current().as_ref() {
+            current.bar.inc(steps);
+        }
+    }
+
+    fn end(&self) {
+        if let Some(Current { stage, began, bar }) = self.current().take() {
+            bar.finish_and_clear();
+            if self.console.verbose() {
+                self.console.note(&format!("{stage}: {:.2} s", began.elapsed().as_secs_f64()));
+            }
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+fn bar(stage: &str, total: u64) -> ProgressBar {
+    let (bar, template) = match total {
+        0 => (ProgressBar::new_spinner(), "{msg:24} {spinner}"),
+        _ => (ProgressBar::new(total), "{msg:24} [{bar:32}] {percent:>3} %, {eta} left"),
+    };
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = bar.with_style(style.progress_chars("=> ")).with_message(stage.to_owned());
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}

@@ -1,0 +1,134 @@
+//! A pipeline as it was written: the file's tree, edited by the command line's overrides.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+use super::error::{Error, Invalid, Place, Refusal};
+use super::overrides;
+use super::yaml::{self, Node, Origin, Problem, Segment, Value};
+
+/// Larger files are refused. A scene of that size belongs into a mesh file.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// A pipeline's text as a tree that knows where everything stands.
+#[derive(Clone, Debug)]
+pub struct Document {
+    file: String,
+    root: Node,
+    sets: Vec<String>,
+}
+
+impl Document {
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let mut bytes = Vec::new();
+        let read = std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
+        read.map_err(|source| Error::Read { path: path.to_owned(), source })?;
+        let not_text = |message: String| Error::NotText { path: path.to_owned(), message };
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(not_text(format!("is larger than {} MB; keep meshes in files of their own", MAX_BYTES >> 20)));
+        }
+        match String::from_utf8(bytes) {
+            Ok(text) => Self::parse(&path.display().to_string(), &text),
+            Err(e) => {
+                let at = e.utf8_error().valid_up_to();
+                Err(not_text(format!(
+                    "is not a pipeline: byte {at} is not UTF-8 text (a binary file, or another encoding)"
+                )))
+            }
+        }
+    }
+
+    /// Reads a text; `file` is what messages call it.
+    pub fn parse(file: &str, text: &str) -> Result<Self, Error> {
+        let blank = Node { origin: Origin::File { line: 1, column: 1 }, value: Value::Null };
+        let mut document = Document { file: file.to_owned(), root: blank, sets: Vec::new() };
+        document.root = yaml::parse(text).map_err(|p| document.error(p))?;
+        Ok(document)
+    }
+
+    /// Applies an override, `KEY=VALUE`. What KEY may be: [`overrides`](super::overrides).
+    pub fn set(&mut self, assignment: &str) -> Result<(), Error> {
+        let origin = Origin::Set(self.sets.len());
+        self.sets.push(assignment.to_owned());
+        overrides::apply(&mut self.root, assignment, origin).map_err(|p| self.error(p.or_at(origin)))
+    }
+
+    /// Reads the whole as a structure.
+    pub fn decode<T: DeserializeOwned>(&self) -> Result<T, Error> {
+        yaml::decode(&self.root).map_err(|p| self.error(p))
+    }
+
+    /// Line and column, from 1, of the value at a dotted path, or of its nearest part that is written. None if
+    /// an override gave it, or if the path is malformed.
+    pub fn locate(&self, path: &str) -> Option<(usize, usize)> {
+        match self.origin(path)? {
+            Origin::File { line, column } => Some((line, column)),
+            Origin::Set(_) => None,
+        }
+    }
+
+    /// The complaint with its line.
+    pub fn refuse(&self, invalid: Invalid) -> Error {
+        let origin = self.origin(&invalid.path).unwrap_or(self.root.origin);
+        let Invalid { path, message } = invalid;
+        Error::Refused(Box::new(Refusal { place: self.place(origin), path, message }))
+    }
+
+    /// The file's name as messages say it.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The folder that relative paths in the pipeline start from.
+    pub fn folder(&self) -> PathBuf {
+        Path::new(&self.file).parent().map(Path::to_owned).unwrap_or_default()
+    }
+
+    fn origin(&self, path: &str) -> Option<Origin> {
+        let mut node = &self.root;
+        let segments = if path.is_empty() { Vec::new() } else { yaml::parse_path(path).ok()? };
+        for segment in &segments {
+            let next = match segment {
+                Segment::Key(key) => node.get(key),
+                Segment::Index(index) => node.items().get(*index),
+            };
+            match next {
+                Some(inner) => node = inner,
+                None => break,
+            }
+        }
+        Some(node.origin)
+    }
+
+    fn place(&self, origin: Origin) -> Place {
+        match origin {
+            Origin::File { line, column } => Place::File { file: self.file.clone(), line, column },
+            Origin::Set(index) => Place::Set(self.sets.get(index).cloned().unwrap_or_default()),
+        }
+    }
+
+    fn error(&self, problem: Problem) -> Error {
+        let place = self.place(problem.origin.unwrap_or(self.root.origin));
+        Error::Refused(Box::new(Refusal { place, path: problem.path(), message: problem.to_string() }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_later_check_can_cite_the_line() {
+        let mut document = Document::parse("p.yaml", "stages:\n  - render:\n      dimensions: [0, 5, 5]\n").unwrap();
+        assert_eq!(document.locate("stages[0].render.dimensions[0]"), Some((3, 20)));
+        assert_eq!(document.locate("stages[0].render.camera.eye"), Some((3, 7)), "absent: the mapping it would be in");
+        let refusal = document.refuse(Invalid::new("stages[0].render.dimensions[0]", "too small"));
+        assert_eq!(refusal.to_string(), "p.yaml:3:20: stages[0].render.dimensions[0]: too small");
+        document.set("render.dimensions=[0, 0, 0]").unwrap();
+        let refusal = document.refuse(Invalid::new("stages[0].render.dimensions[0]", "too small"));
+        assert_eq!(refusal.to_string(), "--set render.dimensions=[0, 0, 0]: stages[0].render.dimensions[0]: too small");
+    }
+}
