@@ -1,5 +1,6 @@
 
 pub mod accel;
+pub mod export;
 pub mod geometry;
 pub mod mesh;
 pub mod occlusion;

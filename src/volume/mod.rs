@@ -1,11 +1,20 @@
-//! Images: a regular grid of voxels, as VTK's `ImageData` means it, and the arrays on it.
+//! Images: a regular grid of voxels, as VTK's `ImageData` means it, the arrays on it, reading and comparison.
 //!
 //! Point (i, j, k) of the grid is at `origin + (i, j, k) * spacing`, and its flat index is `i + W (j + H k)`: x runs
 //! fastest. A 2D image is a volume of one layer.
+//!
+//! [`read()`] takes an image from a file, [`vtk`] whatever else VTK's files hold, and [`compare`] says how far two of
+//! them are apart.
 
 mod array;
+pub mod compare;
+mod error;
+pub mod vtk;
 
-pub use array::{Array, Values};
+use std::path::Path;
+
+pub use array::{Array, Kind, Values};
+pub use error::{Error, Problem};
 
 /// Dimensions and placement of an image. Voxel centres are the grid's points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +33,11 @@ impl Grid {
         self.dimensions.iter().product()
     }
 
+    /// The number of points, unless it exceeds what a `usize` counts.
+    pub fn checked_len(&self) -> Option<usize> {
+        self.dimensions.iter().try_fold(1usize, |n, &d| n.checked_mul(d))
+    }
+
     /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -38,6 +52,12 @@ impl Grid {
     pub fn point(&self, index: [usize; 3]) -> [f64; 3] {
         std::array::from_fn(|a| self.origin[a] + index[a] as f64 * self.spacing[a])
     }
+
+    /// The index (i, j, k) of the point with this flat index.
+    pub fn index(&self, flat: usize) -> [usize; 3] {
+        let [w, h, _] = self.dimensions.map(|n| n.max(1));
+        [flat % w, flat / w % h, flat / w / h]
+    }
 }
 
 /// A whole image in memory.
@@ -49,4 +69,38 @@ pub struct Volume {
     pub arrays: Vec<Array>,
     /// Named strings that belong to the image as a whole (VTK's field data).
     pub field_data: Vec<(String, String)>,
+}
+
+impl Volume {
+    /// The array of this name.
+    pub fn array(&self, name: &str) -> Option<&Array> {
+        self.arrays.iter().find(|a| a.name == name)
+    }
+}
+
+/// Reads an image from a `.vti` file.
+///
+/// # Errors
+/// If it cannot be read, is damaged or something else, or carries what a [`Volume`] cannot: arrays on cells, or a
+/// rotated grid. Nothing is left out in silence; [`vtk::read`] takes such files too.
+pub fn read(path: &Path) -> Result<Volume, Error> {
+    let in_file = |problem| Error::File { path: path.into(), problem };
+    match vtk::read(path)? {
+        vtk::DataSet::Image(image) => image.into_volume().map_err(in_file),
+        vtk::DataSet::Unstructured(_) => Err(in_file(Problem::Kind { found: "a mesh".into(), expected: "an image" })),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flat_index_and_index_agree() {
+        let grid = Grid { dimensions: [3, 4, 5], origin: [0.0; 3], spacing: [1.0; 3] };
+        for flat in 0..grid.len() {
+            let [i, j, k] = grid.index(flat);
+            assert_eq!(i + 3 * (j + 4 * k), flat);
+        }
+    }
 }

@@ -1,0 +1,69 @@
+//! What goes wrong when files are written.
+
+use std::io;
+use std::path::PathBuf;
+
+/// A file could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refuses, and for which file.
+    #[error("{}: cannot {action}: {}", path.display(), explain(cause))]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// The system's reason.
+        cause: io::Error,
+    },
+    /// Writing fails.
+    #[error("writing failed: {}", explain(.0))]
+    Write(#[from] io::Error),
+    /// More bytes than the disk has left.
+    #[error("{}: {needed} bytes are to be written, and the disk has {free} left; free some, or write elsewhere", path.display())]
+    NoSpace {
+        /// Where they were to go.
+        path: PathBuf,
+        /// How many there are.
+        needed: u64,
+        /// How many fit.
+        free: u64,
+    },
+    /// What is written does not fit what was announced.
+    #[error("array `{array}`: {found} where {expected} was expected")]
+    Shape {
+        /// The array.
+        array: String,
+        /// What was handed over.
+        found: String,
+        /// What should have been.
+        expected: String,
+    },
+    /// A name that cannot stand in a file.
+    #[error("{what} {name:?} cannot be written to an XML file; use letters, digits and `_`")]
+    Name {
+        /// What has the name.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// The PNG encoder refuses.
+    #[error("writing the picture failed: {0}")]
+    Png(#[from] ::png::EncodingError),
+    /// The mesh writer refuses.
+    #[error("writing the mesh failed: {0}")]
+    Mesh(String),
+}
+
+/// A system's reason, with a remedy where there is a plain one.
+fn explain(cause: &io::Error) -> String {
+    match cause.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            format!("{cause}; free some space, or write elsewhere")
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            format!("{cause}; write to another folder, or change its permissions")
+        }
+        _ => cause.to_string(),
+    }
+}
