@@ -4,5 +4,6 @@
 //! it to `f32` once. From then on the mesh is the geometry, for every method; its vertices are never renumbered.
 
 mod surface;
+pub mod topology;
 
 pub use surface::Surface;
