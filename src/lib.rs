@@ -1,3 +1,4 @@
+//! `ao4d` turns a YAML pipeline into pictures of four-dimensional scenes with ray-traced ambient occlusion.
 
 pub mod accel;
 pub mod export;
@@ -7,4 +8,5 @@ pub mod occlusion;
 pub mod pipeline;
 pub mod progress;
 pub mod render;
+pub mod scene;
 pub mod volume;

@@ -18,6 +18,7 @@ mod incidence;
 pub mod normals;
 pub mod orientation;
 mod surface;
+pub mod topology;
 
 use std::ops::Range;
 

@@ -1,0 +1,200 @@
+//! How the simplices of a surface hang together, and what they enclose.
+//!
+//! A surface is *closed* when its boundary, as a sum of oriented facets, is zero: every facet of a simplex is met by
+//! one of another simplex with the opposite orientation. Facets are compared as sorted vertex indices; the parity of
+//! the sort, and of the place of the vertex left out, is the orientation. A closed surface divides space, and by the
+//! divergence theorem its simplices add up to the volume inside:
+//!
+//! ```text
+//! volume = 1/D! * sum over simplices of det[v_0 - p, v_1 - p, ..., v_(D-1) - p]      for any point p
+//! ```
+//!
+//! which is positive when the normals point outwards. For an open surface the sum depends on p and means nothing.
+
+use crate::geometry::{Vector64, determinant, measure};
+
+/// How the facets of a surface are shared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FacetPairs {
+    /// Distinct facets.
+    pub facets: usize,
+    /// Facets of exactly two simplices, with opposite orientations: what a closed manifold consists of.
+    pub paired: usize,
+    /// Facets of one simplex only: the rim of an open surface.
+    pub open: usize,
+    /// Facets of exactly two simplices that run the same way: the two are oriented against each other.
+    pub misoriented: usize,
+    /// Facets of three simplices or more: bodies that touch along a facet.
+    pub crowded: usize,
+    /// Facets whose orientations don't cancel, among them all open and misoriented ones.
+    pub unbalanced: usize,
+}
+
+impl FacetPairs {
+    /// Whether the surface has no boundary, so that it encloses a volume.
+    pub fn is_closed(&self) -> bool {
+        self.unbalanced == 0
+    }
+
+    /// Whether every facet has exactly two simplices, in agreement.
+    pub fn is_manifold(&self) -> bool {
+        self.paired == self.facets
+    }
+}
+
+/// Sorts the entries, and tells whether that took an odd number of exchanges.
+pub fn sort_with_parity<T: Ord>(entries: &mut [T]) -> bool {
+    let mut odd = false;
+    for i in 1..entries.len() {
+        let mut j = i;
+        while j > 0 && entries[j - 1] > entries[j] {
+            entries.swap(j - 1, j);
+            odd = !odd;
+            j -= 1;
+        }
+    }
+    odd
+}
+
+/// The facets of a simplex as sorted indices and whether they run against the sorted order. Facets that name a vertex
+/// twice are left out: the simplices that have them have no measure, and their other facets cancel.
+fn facets_of<const D: usize>(simplex: &[u32; D]) -> impl Iterator<Item = ([u32; 3], bool)> + '_ {
+    (0..D).filter_map(|left_out| {
+        let mut facet = [u32::MAX; 3];
+        for (slot, &vertex) in
+            facet.iter_mut().zip(simplex.iter().enumerate().filter(|(i, _)| *i != left_out).map(|(_, v)| v))
+        {
+            *slot = vertex;
+        }
+        let odd = sort_with_parity(&mut facet[..D - 1]);
+        let distinct = facet[..D - 1].windows(2).all(|pair| pair[0] < pair[1]);
+        distinct.then_some((facet, odd != (left_out % 2 == 1)))
+    })
+}
+
+/// How the facets of these simplices are shared. Vertices are told apart by index: weld first what should count as one.
+pub fn facet_pairs<const D: usize>(simplices: &[[u32; D]]) -> FacetPairs {
+    let mut facets: Vec<([u32; 3], bool)> = simplices.iter().flat_map(facets_of).collect();
+    facets.sort_unstable();
+    let mut pairs = FacetPairs::default();
+    for shared in facets.chunk_by(|a, b| a.0 == b.0) {
+        let turned = shared.iter().filter(|(_, turned)| *turned).count();
+        pairs.facets += 1;
+        pairs.unbalanced += usize::from(2 * turned != shared.len());
+        match (shared.len(), turned) {
+            (1, _) => pairs.open += 1,
+            (2, 1) => pairs.paired += 1,
+            (2, _) => pairs.misoriented += 1,
+            _ => pairs.crowded += 1,
+        }
+    }
+    pairs
+}
+
+/// Whether the surface has no boundary: [`FacetPairs::is_closed`].
+pub fn is_closed<const D: usize>(simplices: &[[u32; D]]) -> bool {
+    facet_pairs(simplices).is_closed()
+}
+
+/// The corners of each simplex. Indices must be within `vertices`.
+pub fn corners<const D: usize>(
+    vertices: &[Vector64<D>],
+    simplices: &[[u32; D]],
+) -> impl Iterator<Item = [Vector64<D>; D]> {
+    simplices.iter().map(|simplex| simplex.map(|i| vertices[i as usize]))
+}
+
+/// The D-volume within a closed surface, in the scene's units to the power D; negative where its normals point inwards.
+pub fn enclosed_volume<const D: usize>(corners: impl IntoIterator<Item = [Vector64<D>; D]>) -> f64 {
+    let mut corners = corners.into_iter().peekable();
+    // Measured from one of its own points, a body far from the origin loses no digits.
+    let Some(from) = corners.peek().map(|first| first[0]) else { return 0.0 };
+    let sum: f64 = corners.map(|simplex| determinant(&simplex.map(|v| v - from))).sum();
+    sum / (1..=D).product::<usize>() as f64
+}
+
+/// The (D-1)-measure of the surface: area in 3D, 3-volume in 4D.
+pub fn surface_measure<const D: usize>(corners: impl IntoIterator<Item = [Vector64<D>; D]>) -> f64 {
+    corners.into_iter().map(|simplex| measure(&simplex)).sum()
+}
+
+/// How near a simplex is to a regular one: 1 if regular, 0 if flat. The ratio of its measure, made a length, to the
+/// root mean square of its edges, normalised: 4 sqrt(3) A / sum l^2 for a triangle, 12 (3 V)^(2/3) / sum l^2 for a
+/// tetrahedron (Liu and Joe, *Relationship between tetrahedron shape measures*, 1994).
+pub fn quality<const D: usize>(simplex: &[Vector64<D>; D]) -> f64 {
+    let squares: f64 =
+        (0..D).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| (simplex[i] - simplex[j]).norm_squared()).sum();
+    let volume = measure(simplex);
+    let numerator = if D == 3 { 48f64.sqrt() * volume } else { 12.0 * (3.0 * volume).powf(2.0 / 3.0) };
+    if squares > 0.0 { numerator / squares } else { 0.0 }
+}
+
+/// The lowest [`quality`] of all simplices, and the index of the simplex that has it; `None` without simplices.
+pub fn worst_quality<const D: usize>(corners: impl IntoIterator<Item = [Vector64<D>; D]>) -> Option<(usize, f64)> {
+    corners.into_iter().map(|simplex| quality(&simplex)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The boundary of the corner simplex 0, e_1, ..., e_D, oriented outwards.
+    fn corner_boundary<const D: usize>() -> (Vec<Vector64<D>>, Vec<[u32; D]>) {
+        let vertices = (0..=D).map(|i| Vector64::from_fn(|r, _| f64::from(i > 0 && r == i - 1))).collect();
+        let simplices = (0..=D)
+            .map(|left_out| {
+                let mut facet: [u32; D] = std::array::from_fn(|k| (k + usize::from(k >= left_out)) as u32);
+                if left_out % 2 == 1 {
+                    facet.swap(0, 1);
+                }
+                facet
+            })
+            .collect();
+        (vertices, simplices)
+    }
+
+    fn check<const D: usize>() {
+        let (vertices, mut simplices) = corner_boundary::<D>();
+        let pairs = facet_pairs(&simplices);
+        assert_eq!(pairs.facets, D * (D + 1) / 2);
+        assert!(pairs.is_closed() && pairs.is_manifold());
+        let factorial = if D == 3 { 6.0 } else { 24.0 };
+        let volume = enclosed_volume(corners(&vertices, &simplices));
+        assert!((volume - 1.0 / factorial).abs() < 1e-15, "{volume}");
+        let moved: Vec<_> = vertices.iter().map(|v| v + Vector64::from_element(1e6)).collect();
+        assert!((enclosed_volume(corners(&moved, &simplices)) - 1.0 / factorial).abs() < 1e-9);
+        // D facets of measure 1/(D-1)! and the slanted one, which is sqrt(D) as large.
+        let expected = (D as f64 + (D as f64).sqrt()) * D as f64 / factorial;
+        assert!((surface_measure(corners(&vertices, &simplices)) - expected).abs() < 1e-14);
+        let regular: [Vector64<D>; D] = std::array::from_fn(|i| Vector64::from_fn(|r, _| f64::from(r == i)));
+        assert!((quality(&regular) - 1.0).abs() < 1e-14);
+        assert_eq!(worst_quality([regular, [regular[0]; D]]), Some((1, 0.0)));
+
+        simplices[0].swap(0, 1);
+        let pairs = facet_pairs(&simplices);
+        assert_eq!((pairs.misoriented, pairs.open, pairs.unbalanced), (D, 0, D));
+        let turned = simplices.remove(0);
+        let pairs = facet_pairs(&simplices);
+        assert_eq!((pairs.misoriented, pairs.open, pairs.unbalanced), (0, D, D));
+        assert!(!pairs.is_closed());
+        // Both sides of one simplex enclose nothing, but they are closed; a third and fourth crowd their facets.
+        let mut other = turned;
+        other.swap(0, 1);
+        assert!(is_closed(&[turned, other]));
+        let pairs = facet_pairs(&[turned, other, turned, other]);
+        assert_eq!((pairs.crowded, pairs.is_closed(), pairs.is_manifold()), (D, true, false));
+    }
+
+    #[test]
+    fn corner_simplex_is_closed_and_has_its_volume() {
+        check::<3>();
+        check::<4>();
+    }
+
+    #[test]
+    fn a_simplex_that_names_a_vertex_twice_does_not_open_a_surface() {
+        let (_, mut simplices) = corner_boundary::<4>();
+        simplices.push([2, 2, 0, 1]);
+        assert!(is_closed(&simplices));
+    }
+}

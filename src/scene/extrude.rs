@@ -1,0 +1,190 @@
+//! Sweeping a three-dimensional mesh along the fourth axis.
+//!
+//! A point p of the mesh moves from p + `from` * direction to p + `to` * direction, in layers. A triangle sweeps a wall, a
+//! prism of three tetrahedra a layer. A tetrahedral mesh is a solid S, and the boundary of what it sweeps is
+//!
+//! ```text
+//! d(S x I) = dS x I - S x dI
+//! ```
+//!
+//! (see [`super::product`]): walls over its boundary triangles, and the solid itself as the two caps. With t tetrahedra,
+//! f boundary triangles and m layers that makes 2 t + 3 m f tetrahedra. The surface of a closed triangle mesh sweeps walls
+//! only, which are open at both ends; its caps would need the inside meshed.
+//!
+//! Points with identical coordinates are one. Tetrahedra of a file may have either orientation; triangles are taken as
+//! they are, so that walls face outwards if the triangles do.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Error;
+use super::lattice::compact;
+use super::numbers::{check_count, finite, point};
+use super::product::Chain;
+use super::readers::{Cells, Input};
+use super::weld::weld;
+use crate::geometry::{Vector64, determinant};
+use crate::mesh::Surface;
+
+/// A mesh from a file, swept along the fourth axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExtrudeSpec {
+    /// The mesh: triangles (`.stl`, `.ply`, `.vtu`) or tetrahedra (`.vtu`). Relative to the pipeline's folder.
+    pub mesh: PathBuf,
+    /// Where the sweep begins along the direction.
+    pub from: f64,
+    /// Where it ends.
+    pub to: f64,
+    /// Whether to close both ends. Tetrahedra can be, and are if this is left out; triangles can't be yet.
+    #[serde(default)]
+    pub caps: Option<bool>,
+    /// Layers of prisms between both ends; 1 if left out.
+    #[serde(default = "one")]
+    #[schemars(range(min = 1))]
+    pub layers: u32,
+    /// What the mesh is swept along; `[0, 0, 0, 1]`, the fourth axis, if left out. The last number must not be 0.
+    #[serde(default)]
+    pub direction: Option<Vec<f64>>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+impl ExtrudeSpec {
+    /// The walls, and caps if the mesh is of tetrahedra. Refused in 3D.
+    pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
+        if D != 4 {
+            return Err(Error::invalid("extrude", format!("needs a scene of dimension 4, not {D}; take file")));
+        }
+        let (from, to) = (finite("extrude.from", self.from)?, finite("extrude.to", self.to)?);
+        if from == to {
+            return Err(Error::invalid("extrude.to", format!("{to} is also where the sweep begins; give another")));
+        }
+        if self.layers == 0 {
+            return Err(Error::invalid("extrude.layers", "0 layers; the least is 1"));
+        }
+        let direction = match &self.direction {
+            Some(direction) => point::<D>("extrude.direction", direction)?,
+            None => Vector64::from_fn(|row, _| f64::from(row == D - 1)),
+        };
+        if direction[D - 1] == 0.0 {
+            let message = "the last number is 0: the mesh would be swept within its own space, not out of it";
+            return Err(Error::invalid("extrude.direction", message));
+        }
+        let input = Input::new("extrude.mesh", folder, &self.mesh);
+        let mesh = input.read()?;
+        let swept = match mesh.cells {
+            Cells::Triangles(triangles) => {
+                if self.caps == Some(true) {
+                    let message = "caps need the solid meshed, and this mesh is of triangles; \
+                                   give a tetrahedral mesh (.vtu) or write caps: false";
+                    return Err(Error::invalid("extrude.caps", message));
+                }
+                let (points, triangles) = weld(&mesh.points, triangles);
+                self.check_size(points.len(), 0, triangles.len())?;
+                let triangles = Chain::of(points.len() as u32, &triangles);
+                Swept { points, chain: triangles.times(&Chain::interval(self.layers)) }
+            }
+            Cells::Tetrahedra(tetrahedra) => {
+                let (points, tetrahedra) = weld(&mesh.points, tetrahedra);
+                let solid = solid(&points, tetrahedra).map_err(|message| input.wrong(message))?;
+                let boundary = solid.boundary();
+                let interval = Chain::interval(self.layers);
+                self.check_size(points.len(), solid.len(), boundary.len())?;
+                let chain = match self.caps {
+                    Some(false) => boundary.times(&interval),
+                    _ => solid.boundary_of_product(&interval),
+                };
+                Swept { points, chain }
+            }
+        };
+        // Swept against the direction in which w grows, the product has the other handedness.
+        let inside_out = (to < from) != (direction[D - 1] < 0.0);
+        Ok(swept.place(self.layers, from, to, &direction, inside_out))
+    }
+
+    fn check_size(&self, points: usize, tetrahedra: usize, walls: usize) -> Result<(), Error> {
+        let layers = u128::from(self.layers);
+        check_count("extrude.layers", 2 * tetrahedra as u128 + 3 * layers * walls as u128)?;
+        if points as u128 * (layers + 1) > u128::from(u32::MAX) {
+            return Err(Error::invalid("extrude.layers", "too many: there would be more than 2^32 points"));
+        }
+        Ok(())
+    }
+}
+
+/// Tetrahedra over pairs (point, layer).
+struct Swept {
+    points: Vec<Vector64<3>>,
+    chain: Chain,
+}
+
+impl Swept {
+    fn place<const D: usize>(
+        self,
+        layers: u32,
+        from: f64,
+        to: f64,
+        direction: &Vector64<D>,
+        inside_out: bool,
+    ) -> Surface<D> {
+        // `oriented` is given 4 vertices a simplex, which is D here.
+        let tetrahedra = self.chain.oriented::<D>();
+        let (used, mut simplices) = compact(tetrahedra);
+        if inside_out {
+            simplices.iter_mut().for_each(|simplex| simplex.swap(D - 2, D - 1));
+        }
+        let place = |pair: u32| {
+            let (point, layer) = (pair / (layers + 1), pair % (layers + 1));
+            let share = f64::from(layer) / f64::from(layers);
+            // Both ends are exact.
+            let along = if layer == layers { to } else { from + (to - from) * share };
+            let point = self.points[point as usize];
+            Vector64::from_fn(|row, _| if row < 3 { point[row] } else { 0.0 } + direction[row] * along)
+        };
+        Surface { vertices: used.into_iter().map(place).collect(), simplices, normals: None }
+    }
+}
+
+/// The solid, every tetrahedron oriented positively, with a boundary that makes sense.
+fn solid(points: &[Vector64<3>], mut tetrahedra: Vec<[u32; 4]>) -> Result<Chain, String> {
+    for (i, tetrahedron) in tetrahedra.iter_mut().enumerate() {
+        let [a, b, c, d] = tetrahedron.map(|i| points[i as usize]);
+        let volume = determinant(&[b - a, c - a, d - a]);
+        if volume == 0.0 {
+            return Err(format!("tetrahedron {i} is flat: it has no volume, and so no orientation; leave it out"));
+        }
+        if volume < 0.0 {
+            tetrahedron.swap(2, 3);
+        }
+    }
+    let mut facets: Vec<([u32; 3], usize)> = Vec::with_capacity(4 * tetrahedra.len());
+    for (i, tetrahedron) in tetrahedra.iter().enumerate() {
+        for left_out in 0..4 {
+            let mut facet: [u32; 3] = std::array::from_fn(|k| tetrahedron[k + usize::from(k >= left_out)]);
+            facet.sort_unstable();
+            facets.push((facet, i));
+        }
+    }
+    facets.sort_unstable();
+    if let Some(shared) = facets.chunk_by(|a, b| a.0 == b.0).find(|shared| shared.len() > 2) {
+        let which: Vec<String> = shared.iter().map(|(_, i)| i.to_string()).collect();
+        return Err(format!("tetrahedra {} all share one triangle, so some of them overlap", which.join(", ")));
+    }
+    let solid = Chain::of(points.len() as u32, &tetrahedra);
+    // Of two tetrahedra on the same side of the triangle they share, the boundary keeps the triangle twice.
+    let boundary = solid.boundary();
+    let mut walls: Vec<[u32; 3]> = boundary.oriented::<3>();
+    walls.iter_mut().for_each(|wall| wall.sort_unstable());
+    walls.sort_unstable();
+    if let Some(twice) = walls.windows(2).find(|pair| pair[0] == pair[1]) {
+        let which: Vec<String> =
+            facets.iter().filter(|(facet, _)| *facet == twice[0]).map(|(_, i)| i.to_string()).collect();
+        return Err(format!("tetrahedra {} lie on the same side of the triangle they share", which.join(" and ")));
+    }
+    Ok(solid)
+}

@@ -1,0 +1,50 @@
+//! A surface from a file: in 4D a `.vtu` of tetrahedra, in 3D triangles from `.stl`, `.ply` or `.vtu`.
+//!
+//! A VTK file's points have three coordinates, so those of a 4D surface are in a point array of four components named
+//! `position`, as this program writes them. In 3D such an array, of three components, wins over the points as well. A point
+//! array `normal` of as many components, where there is one, is taken for the normals. Vertices keep their order; only STL,
+//! which has none, is welded.
+
+use std::path::{Path, PathBuf};
+
+use super::Error;
+use super::numbers::MAX_SIMPLICES;
+use super::readers::{Cells, Input};
+use crate::mesh::Surface;
+
+/// The surface that the file holds.
+pub fn build<const D: usize>(path: &PathBuf, folder: &Path) -> Result<Surface<D>, Error> {
+    let input = Input::new("file", folder, path);
+    let mesh = input.read()?;
+    let position = mesh.vectors::<D>("position", &input)?;
+    let normals = mesh.vectors::<D>("normal", &input)?;
+    let simplices: Option<Vec<[u32; D]>> = match &mesh.cells {
+        Cells::Triangles(triangles) => of_size(triangles),
+        Cells::Tetrahedra(tetrahedra) => of_size(tetrahedra),
+    };
+    let Some(simplices) = simplices else {
+        return Err(input.wrong(if D == 4 {
+            "holds triangles; a scene of dimension 4 is made of tetrahedra: take extrude, or dimension: 3"
+        } else {
+            "holds tetrahedra; a scene of dimension 3 is made of triangles"
+        }));
+    };
+    if simplices.len() as u64 > MAX_SIMPLICES {
+        return Err(input.wrong(format!("holds {} simplices; the most is {MAX_SIMPLICES}", simplices.len())));
+    }
+    let vertices = match position {
+        Some(position) => position,
+        None if D == 3 => mesh.points.iter().map(|p| crate::geometry::Vector64::from_fn(|row, _| p[row])).collect(),
+        None => {
+            return Err(input.wrong(
+                "has no point array \"position\" of 4 components; extrude sweeps a three-dimensional mesh along w",
+            ));
+        }
+    };
+    Ok(Surface { vertices, simplices, normals })
+}
+
+/// The simplices, if N is D.
+fn of_size<const N: usize, const D: usize>(simplices: &[[u32; N]]) -> Option<Vec<[u32; D]>> {
+    simplices.iter().map(|simplex| simplex.as_slice().try_into().ok()).collect()
+}

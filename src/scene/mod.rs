@@ -1,0 +1,43 @@
+//! Objects of a scene: from what a pipeline says to a placed surface.
+//!
+//! Each shape is one file, which holds the keys it takes in YAML and makes a [`crate::mesh::Surface`] of them, for D = 3
+//! and 4 alike; nothing else knows the shapes. All compute in `f64`; the mesh that is traced rounds once, later. Closed
+//! shapes come out closed, with shared vertices, facing outwards:
+//!
+//! | key | what | made by |
+//! | --- | --- | --- |
+//! | `simplices` | vertices and simplices as listed | - |
+//! | `file` | a surface from a file | [`readers`] |
+//! | `box`, `tesseract` | boundary of a product of intervals | [`product`] |
+//! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`] |
+//! | `cut_cube` | a box minus boxes | [`lattice`] |
+//! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
+//!
+//! [`build_object`] checks everything that can be wrong with an object, so whoever checks a pipeline builds its scene.
+
+mod color;
+mod cuboid;
+mod cut_cube;
+mod error;
+mod extrude;
+mod file;
+mod hypersphere;
+pub mod lattice;
+mod numbers;
+mod object;
+pub mod product;
+pub mod readers;
+mod simplices;
+mod transform;
+mod weld;
+
+pub use color::Color;
+pub use cuboid::{BoxSpec, TesseractSpec};
+pub use cut_cube::{CutCubeSpec, CutSpec};
+pub use error::Error;
+pub use extrude::ExtrudeSpec;
+pub use hypersphere::SphereSpec;
+pub use numbers::{MAX_SIMPLICES, OneOrEach};
+pub use object::{ObjectSpec, Orientation, Shape, build_object};
+pub use simplices::SimplicesSpec;
+pub use transform::{RotateSpec, TransformStep};

@@ -1,0 +1,181 @@
+//! One object of a scene: what it is, where it is, its colour.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::color::Color;
+use super::cuboid::{BoxSpec, TesseractSpec};
+use super::cut_cube::CutCubeSpec;
+use super::extrude::ExtrudeSpec;
+use super::hypersphere::SphereSpec;
+use super::numbers::AXES;
+use super::simplices::SimplicesSpec;
+use super::transform::{self, TransformStep};
+use super::{Error, file};
+use crate::mesh::Surface;
+
+/// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectSpec {
+    /// What to call it in messages and files.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Shape: vertices and simplices listed here.
+    #[serde(default)]
+    pub simplices: Option<SimplicesSpec>,
+    /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.ply`, `.vtu` in 3D.
+    #[serde(default)]
+    pub file: Option<PathBuf>,
+    /// Shape: a three-dimensional mesh swept along the fourth axis.
+    #[serde(default)]
+    pub extrude: Option<ExtrudeSpec>,
+    /// Shape: a box from which smaller boxes are cut away.
+    #[serde(default)]
+    pub cut_cube: Option<CutCubeSpec>,
+    /// Shape: an axis-parallel box.
+    #[serde(default)]
+    pub r#box: Option<BoxSpec>,
+    /// Shape: the 4-cube around the origin.
+    #[serde(default)]
+    pub tesseract: Option<TesseractSpec>,
+    /// Shape: a sphere of the scene's dimension: of tetrahedra in 4D, of triangles in 3D.
+    #[serde(default)]
+    pub hypersphere: Option<SphereSpec>,
+    /// Shape: a sphere in 3D.
+    #[serde(default)]
+    pub sphere: Option<SphereSpec>,
+    /// Steps that place the object, applied in this order.
+    #[serde(default)]
+    pub transform: Vec<TransformStep>,
+    /// The colour; a light grey of 0.8 if left out.
+    #[serde(default)]
+    pub color: Color,
+    /// Which way an open surface faces.
+    #[serde(default)]
+    pub orientation: Orientation,
+}
+
+/// Which way an open surface faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Orientation {
+    /// As the order of its vertices says.
+    #[default]
+    Input,
+    /// Towards the eye.
+    Eye,
+}
+
+/// The one shape of an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape<'a> {
+    /// Vertices and simplices listed.
+    Simplices(&'a SimplicesSpec),
+    /// A surface from a file.
+    File(&'a PathBuf),
+    /// A three-dimensional mesh swept along the fourth axis.
+    Extrude(&'a ExtrudeSpec),
+    /// A box from which smaller boxes are cut away.
+    CutCube(&'a CutCubeSpec),
+    /// An axis-parallel box.
+    Box(&'a BoxSpec),
+    /// The 4-cube around the origin.
+    Tesseract(&'a TesseractSpec),
+    /// A sphere of the scene's dimension.
+    Hypersphere(&'a SphereSpec),
+    /// A sphere in 3D.
+    Sphere(&'a SphereSpec),
+}
+
+impl Shape<'_> {
+    /// Its key in the pipeline.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Shape::Simplices(_) => "simplices",
+            Shape::File(_) => "file",
+            Shape::Extrude(_) => "extrude",
+            Shape::CutCube(_) => "cut_cube",
+            Shape::Box(_) => "box",
+            Shape::Tesseract(_) => "tesseract",
+            Shape::Hypersphere(_) => "hypersphere",
+            Shape::Sphere(_) => "sphere",
+        }
+    }
+
+    /// The file it is read from, as the pipeline names it.
+    pub fn input_file(&self) -> Option<&Path> {
+        match self {
+            Shape::File(path) => Some(path),
+            Shape::Extrude(spec) => Some(&spec.mesh),
+            _ => None,
+        }
+    }
+
+    /// The surface, before it is placed.
+    fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
+        match self {
+            Shape::Simplices(spec) => spec.build(),
+            Shape::File(path) => file::build(path, folder),
+            Shape::Extrude(spec) => spec.build(folder),
+            Shape::CutCube(spec) => spec.build(),
+            Shape::Box(spec) => spec.build(),
+            Shape::Tesseract(spec) => spec.build(),
+            Shape::Hypersphere(spec) => spec.build("hypersphere"),
+            Shape::Sphere(_) if D != 3 => {
+                Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
+            }
+            Shape::Sphere(spec) => spec.build("sphere"),
+        }
+    }
+}
+
+impl ObjectSpec {
+    /// The object's shape; refused if there is none, or more than one.
+    pub fn shape(&self) -> Result<Shape<'_>, Error> {
+        let shapes = [
+            self.simplices.as_ref().map(Shape::Simplices),
+            self.file.as_ref().map(Shape::File),
+            self.extrude.as_ref().map(Shape::Extrude),
+            self.cut_cube.as_ref().map(Shape::CutCube),
+            self.r#box.as_ref().map(Shape::Box),
+            self.tesseract.as_ref().map(Shape::Tesseract),
+            self.hypersphere.as_ref().map(Shape::Hypersphere),
+            self.sphere.as_ref().map(Shape::Sphere),
+        ];
+        let mut given = shapes.into_iter().flatten();
+        match (given.next(), given.next()) {
+            (Some(shape), None) => Ok(shape),
+            (Some(first), Some(second)) => Err(Error::invalid(
+                second.key(),
+                format!("the object is already a {}; an object has one shape, so make it two objects", first.key()),
+            )),
+            _ => Err(Error::invalid(
+                "",
+                "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, \
+                 hypersphere, sphere",
+            )),
+        }
+    }
+}
+
+/// The object's surface where the scene has it. Paths are relative to `folder`.
+pub fn build_object<const D: usize>(spec: &ObjectSpec, folder: &Path) -> Result<Surface<D>, Error> {
+    let shape = spec.shape()?;
+    spec.color.rgb()?;
+    let mut surface = shape.build::<D>(folder)?;
+    transform::apply(&spec.transform, &mut surface)?;
+    // Coordinates are rounded to single precision afterwards and must survive that.
+    let too_large = |x: &f64| !(x.abs() <= f64::from(f32::MAX));
+    if let Some((i, vertex)) = surface.vertices.iter().enumerate().find(|(_, vertex)| vertex.iter().any(too_large)) {
+        let axis = vertex.iter().position(too_large).unwrap_or_default();
+        let key = if spec.transform.is_empty() { shape.key() } else { "transform" };
+        return Err(Error::invalid(
+            key,
+            format!("vertex {i} has {} = {:e}, beyond single precision (3.4e38)", AXES[axis], vertex[axis]),
+        ));
+    }
+    Ok(surface)
+}
