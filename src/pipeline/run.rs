@@ -1,0 +1,349 @@
+//! Running a plan: scene by scene, in the order of its stages, as lazily as its files allow.
+//!
+//! A value is computed when some file that has to be made needs it, and not before: the hierarchy over a scene when
+//! something is traced, an occlusion when it is written or a picture is shaded by it. Pictures are made slab by slab
+//! and go to all their files at once, so none is ever in memory as a whole.
+
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use super::build::{AnyMesh, camera};
+use super::cache::{Cache, Keys};
+use super::files::{self, PictureFiles};
+use super::plan::{Computation, OcclusionSource, Plan, RenderPlan, Samples, StageRef, grouped};
+use super::prepare::{Prepared, read_values};
+use super::report::{FileReport, Report};
+use super::spec::{self, Method};
+use super::work::{Stale, file_key};
+use super::{Error, Pipeline, Settings, figure, limits};
+use crate::accel::Tracer;
+use crate::export;
+use crate::mesh::Mesh;
+use crate::occlusion::{self, Cancelled, Sampler};
+use crate::progress::Progress;
+use crate::render::{CameraError, Picture, Shading};
+
+/// A run that didn't succeed.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Something is wrong with the pipeline or a file it names; nothing was written.
+    #[error(transparent)]
+    Refused(#[from] Error),
+    /// Ctrl-C.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// A file can't be written.
+    #[error(transparent)]
+    Export(#[from] export::Error),
+    /// A picture doesn't fit in memory.
+    #[error("one layer of the largest picture takes {needed} bytes of memory, and {available} are free; make the picture smaller")]
+    Memory {
+        /// Bytes that are needed at once.
+        needed: u64,
+        /// Bytes that are there.
+        available: u64,
+    },
+    /// Rounding left a camera without a frame.
+    #[error("a camera can't be placed: {0}")]
+    Camera(#[from] CameraError),
+    /// Threads can't be started.
+    #[error("can't start the threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+/// Runs a pipeline and writes its files. The files are the same bytes on any number of threads.
+///
+/// # Errors
+/// [`RunError`]; files that were finished before stay, none is left half-written.
+pub fn run(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
+    let threads = settings.threads.map_or(0, std::num::NonZeroUsize::get);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    pool.install(|| run_here(pipeline, settings, progress))
+}
+
+fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
+    let began = Instant::now();
+    let plan = &pipeline.plan;
+    let keys = Keys::new(plan);
+    let cache = Cache::open(&plan.out, settings.force);
+    let stale = Stale::new(plan, &keys, &cache);
+    limits::check(plan, &stale)?;
+    progress.begin("scene", 0);
+    let prepared = pipeline.prepare(|scene| stale.scene(plan, scene));
+    progress.end();
+    let Prepared { meshes, loaded } = prepared?;
+    let building = began.elapsed();
+    let report = Report { out: plan.out.clone(), ..Report::default() };
+    let mut run = Run { plan, keys, cache, stale, loaded, progress, report, times: BTreeMap::new() };
+    for (scene, mesh) in meshes.into_iter().enumerate() {
+        match mesh {
+            Some(AnyMesh::Three(mesh)) => run.scene(scene, &mesh, building)?,
+            Some(AnyMesh::Four(mesh)) => run.scene(scene, &mesh, building)?,
+            None => run.cached_scene(scene)?,
+        }
+    }
+    for (i, figure) in plan.figures.iter().enumerate() {
+        let start = Instant::now();
+        let (bytes, cached) = figure::write(plan, figure)?;
+        run.report.files.push(FileReport { path: figure.state.clone(), bytes, cached });
+        run.times.insert(StageRef::Figure(i), (start.elapsed(), String::new()));
+    }
+    let mut report = run.report;
+    for &stage in &plan.order {
+        let (time, detail) = run.times.remove(&stage).unwrap_or_default();
+        report.stage(format!("{} {}", stage.kind(), plan.id(stage)), time, detail);
+    }
+    report.seconds = began.elapsed().as_secs_f64();
+    Ok(report)
+}
+
+/// A run in progress.
+struct Run<'p> {
+    plan: &'p Plan,
+    keys: Keys,
+    cache: Cache,
+    stale: Stale,
+    loaded: Vec<Option<Vec<f32>>>,
+    progress: &'p dyn Progress,
+    report: Report,
+    times: BTreeMap<StageRef, (Duration, String)>,
+}
+
+/// What has been made of a scene so far.
+struct Scene<'m, const D: usize> {
+    mesh: &'m Mesh<D>,
+    hash: String,
+    tracer: OnceCell<Tracer<'m, D>>,
+    values: BTreeMap<usize, Vec<f32>>,
+}
+
+impl<'m, const D: usize> Scene<'m, D> {
+    fn tracer(&self) -> &Tracer<'m, D> {
+        self.tracer.get_or_init(|| Tracer::new(self.mesh))
+    }
+}
+
+impl Run<'_> {
+    /// Runs the stages that work on one scene, in order.
+    fn scene<const D: usize>(&mut self, index: usize, mesh: &Mesh<D>, building: Duration) -> Result<(), RunError> {
+        let id = &self.plan.scenes[index].id;
+        let detail = format!(
+            "{} vertices, {} simplices",
+            grouped(mesh.vertices.len() as u64),
+            grouped(mesh.simplices.len() as u64)
+        );
+        self.times.insert(StageRef::Scene(index), (building, detail));
+        if !mesh.degenerate.is_empty() {
+            let first = mesh.degenerate[0];
+            let object = &mesh.objects[mesh.object_of(first)].name;
+            self.report.notes.push(format!(
+                "scene {id}: {} of {} simplices have measure zero and are left out (the first is number {first}, of {object})",
+                mesh.degenerate.len(),
+                mesh.simplices.len()
+            ));
+        }
+        let mut scene =
+            Scene { mesh, hash: mesh.content_hash(), tracer: OnceCell::new(), values: BTreeMap::new() };
+        let plan = self.plan;
+        for &stage in &plan.order {
+            let start = Instant::now();
+            let detail = match stage {
+                StageRef::Occlusion(i) if plan.occlusions[i].scene == index => self.occlusion(i, &mut scene)?,
+                StageRef::Render(i) if plan.renders[i].scene == index => self.render(i, &mut scene)?,
+                StageRef::Write(i) if plan.renders[plan.writes[i].render].scene == index => {
+                    self.write(i, &mut scene)?
+                }
+                _ => continue,
+            };
+            let known = self.times.entry(stage).or_default();
+            known.0 += start.elapsed();
+            known.1 = detail;
+        }
+        Ok(())
+    }
+
+    /// Reports the files of a scene of which nothing had to be made.
+    fn cached_scene(&mut self, index: usize) -> Result<(), RunError> {
+        let plan = self.plan;
+        for &stage in &plan.order {
+            match stage {
+                StageRef::Occlusion(i) if plan.occlusions[i].scene == index => {
+                    self.note_cached(plan.occlusions[i].file.as_deref());
+                }
+                StageRef::Write(i) if plan.renders[plan.writes[i].render].scene == index => {
+                    plan.writes[i].files().for_each(|f| self.note_cached(Some(f)));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn note_cached(&mut self, file: Option<&Path>) {
+        if let Some(file) = file {
+            let bytes = std::fs::metadata(self.plan.out.join(file)).map_or(0, |m| m.len());
+            self.report.files.push(FileReport { path: file.to_owned(), bytes, cached: true });
+        }
+    }
+
+    fn note_written(&mut self, file: &Path, bytes: u64, key: &str) -> Result<(), RunError> {
+        self.cache.record(file, key)?;
+        self.report.files.push(FileReport { path: file.to_owned(), bytes, cached: false });
+        Ok(())
+    }
+
+    /// Writes an occlusion's file, if it has one that isn't there yet.
+    fn occlusion<const D: usize>(&mut self, index: usize, scene: &mut Scene<D>) -> Result<String, RunError> {
+        let Some(file) = self.plan.occlusions[index].file.as_deref() else { return Ok(String::new()) };
+        if !self.stale.occlusion[index] {
+            self.note_cached(Some(file));
+            return Ok("as it was".to_owned());
+        }
+        let start = Instant::now();
+        self.values(index, scene)?;
+        let detail = self.rate(index, scene.mesh.vertices.len(), start.elapsed());
+        let values = &scene.values[&index];
+        let path = self.plan.out.join(file);
+        let bytes = files::write_occlusion(&path, values, &self.plan.occlusions[index], self.plan.seed, &scene.hash)?;
+        self.note_written(file, bytes, &self.keys.occlusion(index).to_owned())?;
+        Ok(detail)
+    }
+
+    fn rate(&self, index: usize, vertices: usize, time: Duration) -> String {
+        match &self.plan.occlusions[index].source {
+            OcclusionSource::Compute(Computation { samples: Samples::Fixed(samples), .. }) => {
+                let rays = *samples as f64 * vertices as f64;
+                format!("{} rays, {:.2} million a second", grouped(rays as u64), rays / time.as_secs_f64() / 1e6)
+            }
+            _ => String::new(),
+        }
+    }
+
+    /// Makes sure that an occlusion's values are known.
+    fn values<const D: usize>(&mut self, index: usize, scene: &mut Scene<D>) -> Result<(), RunError> {
+        if scene.values.contains_key(&index) {
+            return Ok(());
+        }
+        let occlusion = &self.plan.occlusions[index];
+        let values = match &occlusion.source {
+            OcclusionSource::Load(_) => self.loaded[index].take().unwrap_or_default(),
+            OcclusionSource::Compute(computation) => {
+                // A file that is still fresh holds the values already.
+                let kept = occlusion.file.as_deref().filter(|_| !self.stale.occlusion[index]);
+                let count = scene.mesh.vertices.len();
+                match kept.map(|f| read_values(&self.plan.out.join(f), &scene.hash, count)) {
+                    Some(Ok(values)) => values,
+                    _ => {
+                        let start = Instant::now();
+                        self.progress.begin(&format!("occlusion {}", occlusion.id), count as u64);
+                        let values = occlusion::at_vertices(scene.tracer(), &sampling(computation), self.progress);
+                        self.progress.end();
+                        self.times.entry(StageRef::Occlusion(index)).or_default().1 =
+                            self.rate(index, count, start.elapsed());
+                        values?
+                    }
+                }
+            }
+        };
+        scene.values.insert(index, values);
+        Ok(())
+    }
+
+    /// Makes a picture, if some file of it isn't there yet, and its files with it.
+    fn render<const D: usize>(&mut self, index: usize, scene: &mut Scene<D>) -> Result<String, RunError> {
+        let plan = self.plan;
+        if !self.stale.render(plan, index) {
+            return Ok("as it was".to_owned());
+        }
+        let render = &plan.renders[index];
+        if let Some(o) = render.occlusion.filter(|_| render.shading != spec::Shading::Voxel) {
+            self.values(o, scene)?;
+        }
+        let camera = camera::<D>(&render.camera)?;
+        let grid = camera.grid(render.dimensions);
+        let picture = Picture { tracer: scene.tracer(), grid, camera, shading: shading(plan, render, &scene.values) };
+        let start = Instant::now();
+        let mut files = PictureFiles::create(plan, index, &self.stale, &grid, &scene.hash)?;
+        let channels = files.channels().to_vec();
+        let thick = picture.layers_within(SLAB_BYTES, &channels);
+        let depth = grid.dimensions[2];
+        // Two passes over the voxels: what is seen, and its shade.
+        self.progress.begin(&format!("render {}", render.id), 2 * render.voxels());
+        let mut seen = 0;
+        for first in (0..depth).step_by(thick) {
+            let layers = first..depth.min(first + thick);
+            let slab = picture.slab(layers, &channels, self.progress)?;
+            seen += files.add_slab(first, &slab)?;
+        }
+        self.progress.end();
+        let rendering = start.elapsed();
+        for (write, kind, file, bytes) in files.finish()? {
+            let key = file_key(&self.keys, &plan.writes[write], kind);
+            self.note_written(&file, bytes, &key)?;
+        }
+        if seen == 0 && !scene.mesh.simplices.is_empty() {
+            self.report.notes.push(files::nothing_seen(&picture, &render.id));
+        }
+        let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
+        Ok(format!("{} of {} voxels see something, {rate:.2} million voxels a second", grouped(seen), grouped(render.voxels())))
+    }
+
+    /// Writes a write's mesh, and reports what was there already. Its pictures were written with the render.
+    fn write<const D: usize>(&mut self, index: usize, scene: &mut Scene<D>) -> Result<String, RunError> {
+        let plan = self.plan;
+        let write = &plan.writes[index];
+        let fresh = [
+            (write.vti.as_deref(), self.stale.vti[index]),
+            (write.raw.as_deref(), self.stale.raw[index]),
+            (write.png.as_deref(), self.stale.png[index]),
+            (write.vtu.as_deref(), self.stale.vtu[index]),
+        ];
+        fresh.into_iter().filter(|(_, stale)| !stale).for_each(|(file, _)| self.note_cached(file));
+        let Some(file) = write.vtu.as_deref().filter(|_| self.stale.vtu[index]) else { return Ok(String::new()) };
+        let render = &plan.renders[write.render];
+        if let Some(o) = render.occlusion {
+            self.values(o, scene)?;
+        }
+        let camera = camera::<D>(&render.camera)?;
+        let values = render.occlusion.map(|o| &scene.values[&o][..]);
+        let (bytes, left_out) = files::write_mesh(&plan.out.join(file), scene.mesh, &camera, values)?;
+        if left_out > 0 {
+            self.report.notes.push(format!(
+                "{}: {left_out} of {} simplices are not wholly before the eye and are left out",
+                file.display(),
+                scene.mesh.simplices.len()
+            ));
+        }
+        let key = file_key(&self.keys, write, "vtu");
+        self.note_written(file, bytes, &key)?;
+        Ok(String::new())
+    }
+}
+
+/// The working set of a slab.
+const SLAB_BYTES: usize = 256 << 20;
+
+/// The settings that a computation stands for.
+fn sampling(computation: &Computation) -> occlusion::Settings {
+    let samples = match computation.samples {
+        Samples::Fixed(n) | Samples::Target { max_samples: n, .. } => n,
+        Samples::Exact => 1,
+    };
+    occlusion::Settings {
+        sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
+        samples: u32::try_from(samples).unwrap_or(u32::MAX),
+        seed: computation.seed,
+        max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
+    }
+}
+
+fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Vec<f32>>) -> Shading<'v> {
+    let Some(o) = render.occlusion else { return Shading::None };
+    match (render.shading, &plan.occlusions[o].source) {
+        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(sampling(computation)),
+        (spec::Shading::Flat, _) => Shading::Flat(&values[&o]),
+        _ => Shading::Smooth(&values[&o]),
+    }
+}
