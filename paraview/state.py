@@ -1,5 +1,5 @@
-# @TITLE_COMMENT@
-# A ParaView state, written by @PROGRAM_COMMENT@ for ParaView 5.10 and later. Three ways to open it:
+# @TITLE@
+# A ParaView state, written by @PROGRAM@ for ParaView 5.10 and later. Three ways to open it:
 #
 #   in the program      File > Load State..., or   paraview --state=THIS_FILE
 #   with a display      pvpython THIS_FILE [FOLDER]
@@ -323,38 +323,45 @@ def show_volume(panel, reader, array, centre, v):
         Hide(reader, v)
 
 
-def show_slice(panel, reader, array, axis, index, move, v):
-    """One layer of voxels, turned to face the viewer: x to the right and y up, else z for the one that is cut off."""
+def turned_slice(panel, reader, axis, index, move):
+    """One layer of voxels, turned to face the viewer."""
     name = '%s: %s slice' % (os.path.splitext(panel['file'])[0], 'xyz'[axis])
     n = panel['dimensions']
     layer = ExtractSubset(registrationName=name, Input=reader)
     layer.VOI = [v for a in range(3) for v in ((index, index) if a == axis else (0, n[a] - 1))]
-    squares = points_to_cells(layer, name + ', squares', flat=axis)
-    turned = Transform(registrationName=name + ', turned', Input=squares)
+    turned = Transform(registrationName=name + ', turned', Input=points_to_cells(layer, name + ', squares', flat=axis))
     setp(turned, TransformAllInputVectors=0)  # three numbers a voxel are a colour here, no direction to be turned
     turned.Transform.Rotate = ([0.0, 90.0, 0.0], [-90.0, 0.0, 0.0], [0.0, 0.0, 0.0])[axis]
     turned.Transform.Translate = move
     HideInteractiveWidgets(turned.Transform)
-    show_cells(turned, v, array, 0.0)
-    show_lines(Outline(registrationName=name + ', outline', Input=turned), v)
+    return turned
 
 
 def show_slices(panel, reader, array, centre, v, aspect):
-    """The layers at the centre, side by side."""
+    """The layers at the centre side by side: xy, xz, and zy, the first letter to the right and the second up."""
+    name = os.path.splitext(panel['file'])[0]
     bounds, n = grid_bounds(panel), panel['dimensions']
     edge = [bounds[2 * a + 1] - bounds[2 * a] for a in range(3)]
     gap = 0.12 * largest(edge)
     left, top = 0.0, largest(edge[1], edge[2])
+    turned = []
     for axis, right, up in ((2, 0, 1), (1, 0, 2), (0, 2, 1)):
         o, s = panel['origin'][axis], panel['spacing'][axis]
         index = smallest(largest(int(math.floor((centre[axis] - o) / s + 1e-9)), 0), n[axis] - 1)
-        # After the turn the image's own axes `right` and `up` lie along x and y.
-        move = [left - bounds[2 * right], (top - edge[up]) / 2 - bounds[2 * up], 0.0]
-        show_slice(panel, reader, array, axis, index, move, v)
-        at = '%.2f' % (o + index * s)
-        show_label('%s%s,  %s = %s' % ('xyz'[right], 'xyz'[up], 'xyz'[axis], '0.00' if at == '-0.00' else at),
-                 [left, (top - edge[up]) / 2 - 0.13 * top, 0.0], v)
+        at = o + index * s
+        # After the turn the image's axes `right` and `up` lie along x and y, and `axis` along z, or against it.
+        move = [left - bounds[2 * right], (top - edge[up]) / 2 - bounds[2 * up], -at if axis == 2 else at]
+        turned.append(turned_slice(panel, reader, axis, index, move))
+        text = '%.2f' % at
+        show_label('%s%s,  %s = %s' % ('xyz'[right], 'xyz'[up], 'xyz'[axis], '0.00' if text == '-0.00' else text),
+                   [left, (top - edge[up]) / 2 - 0.13 * top, 0.0], v)
         left += edge[right] + gap
+    together = AppendDatasets(registrationName=name + ': slices', Input=turned)
+    show_cells(together, v, array, 0.0)
+    surface = ExtractSurface(registrationName=name + ': slices, surface', Input=together)
+    frames = FeatureEdges(registrationName=name + ': slices, frames', Input=surface)
+    setp(frames, BoundaryEdges=1, FeatureEdges=0, NonManifoldEdges=0, ManifoldEdges=0, Coloring=0)
+    show_lines(frames, v)
     place_parallel(v, [0.0, left - gap, -0.2 * top, top], aspect)
 
 

@@ -1,5 +1,6 @@
 //! `ao4d` turns a YAML pipeline into pictures of four-dimensional scenes with ray-traced ambient occlusion.
 
+pub mod export;
 pub mod geometry;
 pub mod mesh;
 pub mod volume;

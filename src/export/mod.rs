@@ -1,0 +1,3 @@
+//! Files: images, meshes, pictures and ParaView states.
+
+pub mod paraview;
