@@ -1,0 +1,500 @@
+# @TITLE@
+# A ParaView state, written by @PROGRAM@ for ParaView 5.10 and later. Three ways to open it:
+#
+#   in the program      File > Load State..., or   paraview --state=THIS_FILE
+#   with a display      pvpython THIS_FILE [FOLDER]
+#   without a display   xvfb-run pvbatch THIS_FILE [FOLDER]
+#
+# The last two write the picture, into FOLDER or else beside this file. The volumes are looked for beside this file
+# too, so the folder may be moved or sent away as a whole.
+#
+# What is shown. Each voxel is drawn as a small box in its own colour, without a colour map and without fog. The upper
+# view of a volume is cut open where CUT says; there the faces of the boxes are dimmed a little by their direction
+# (RELIEF) so that the eye can tell them apart. The lower view shows three slices, in exactly the colours of the file.
+
+import math
+import os
+import sys
+
+from paraview.simple import *
+from paraview import servermanager
+import paraview.simple
+
+# ---------------------------------------------------------------------------------------------- the figure: edit here
+
+PANELS = @PANELS@
+SOURCE = @SOURCE@           # 'vti', or 'raw' for float32 triples without a header
+CUT = @CUT@                 # None, ('octant', corner or None), or ('plane', axis 0 to 2, position)
+SCREENSHOT = @SCREENSHOT@   # the picture's name, or None
+SIZE = @SIZE@               # the picture's width and height in pixels, or None: as the panels need
+RELIEF = 0.3                # how much a voxel's face is dimmed by its direction; 0: not at all
+CAMERA = (1.0, 0.72, 1.45)  # from where the volumes are seen, against the middle of the image; +y is up
+LINES = (0.62, 0.62, 0.62)  # the colour of outlines
+TEXT = (0.0, 0.0, 0.0)
+
+# ParaView runs the script of a programmable filter among this file's own names, and puts all of numpy's there: `max`,
+# `sum`, `split`, `save` ... So Python's own are kept under other names, and what is global here has a name numpy lacks.
+largest, smallest, total = max, min, sum
+
+# ------------------------------------------------------------------------------------------------------------- files
+
+try:
+    HERE = os.path.dirname(os.path.abspath(__file__))
+except NameError:  # pasted into the Python shell
+    HERE = os.getcwd()
+
+
+def stop(message):
+    raise RuntimeError(message)
+
+
+def locate_file(name):
+    path = os.path.normpath(os.path.join(HERE, name))
+    if not os.path.isfile(path):
+        stop('%s is missing: it belongs beside this state, in %s. Run the pipeline again, or move both together.'
+             % (name, HERE))
+    return path
+
+
+def setp(proxy, **properties):
+    """Sets the properties that this version of ParaView has, and skips the others."""
+    known = set(proxy.ListProperties())
+    for name, value in properties.items():
+        if name in known:
+            setattr(proxy, name, value)
+
+
+def read_vti(panel):
+    reader = XMLImageDataReader(registrationName=panel['file'], FileName=[locate_file(panel['file'])])
+    setp(reader, TimeArray='None')
+    return reader
+
+
+def read_raw(panel):
+    """Numbers without a header: all that describes them is given here."""
+    path = locate_file(panel['file'])
+    nx, ny, nz = panel['dimensions']
+    expected = 12 * nx * ny * nz
+    if os.path.getsize(path) != expected:  # ParaView would wait for ever for what a short file lacks
+        stop('%s has %d bytes, but %d x %d x %d voxels of three float32 are %d. Run the pipeline again.'
+             % (panel['file'], os.path.getsize(path), nx, ny, nz, expected))
+    reader = ImageReader(registrationName=panel['file'], FileNames=[path])
+    setp(reader, DataScalarType='float', DataByteOrder='LittleEndian', NumberOfScalarComponents=3,
+         FileDimensionality='3', FileLowerLeft=1, ScalarArrayName='rgb',
+         DataOrigin=panel['origin'], DataSpacing=panel['spacing'])
+    if 'DataExtent' in reader.ListProperties():
+        reader.DataExtent = [0, nx - 1, 0, ny - 1, 0, nz - 1]
+    else:  # since ParaView 6.1
+        setp(reader, MinimumIndex=[0, 0, 0], Dimensions=[nx, ny, nz])
+    return reader
+
+
+def read_panel(panel):
+    reader = read_raw(panel) if SOURCE == 'raw' else read_vti(panel)
+    reader.UpdatePipeline()
+    extent = reader.GetDataInformation().GetExtent()
+    found = [extent[2 * a + 1] - extent[2 * a] + 1 for a in range(3)]
+    if found != list(panel['dimensions']):
+        stop('%s has %s voxels, but this state was written for %s. Run the pipeline again.'
+             % (panel['file'], ' x '.join(map(str, found)), ' x '.join(map(str, panel['dimensions']))))
+    return reader
+
+
+def colour_array(reader, panel):
+    """The array that holds the colour."""
+    for name in ('rgba', 'rgb'):
+        if name in reader.PointData.keys():
+            return name
+    stop('%s has neither rgba nor rgb: add one of them to the arrays that the pipeline writes.' % panel['file'])
+
+
+# ------------------------------------------------------------------------------------------------------------ voxels
+
+# A file's points are the centres of its voxels. ParaView draws the boxes *between* points and blends their colours, so
+# the same numbers are handed on as cells, of a grid that is one larger and moved by half a voxel; along the axis FLAT,
+# which has one layer, the cells stay flat. An array `shown` is added: 1 where a voxel is opaque and not cut away. AWAY
+# has, for each axis that the cut is about, the position beyond which voxels go.
+VOXELS_EXTENT = '''
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as keys
+extent = list(self.GetExecutive().GetInputInformation(0, 0).Get(keys.WHOLE_EXTENT()))
+for axis in range(3):
+    if FLAT != axis:
+        extent[2 * axis + 1] += 1
+self.GetExecutive().GetOutputInformation(0).Set(keys.WHOLE_EXTENT(), extent, 6)
+'''
+VOXELS_REQUEST = '''
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as keys
+wanted = self.GetExecutive().GetInputInformation(0, 0)
+wanted.Set(keys.UPDATE_EXTENT(), wanted.Get(keys.WHOLE_EXTENT()), 6)
+'''
+VOXELS_CELLS = '''
+import numpy
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+points, cells = self.GetInputDataObject(0, 0), self.GetOutputDataObject(0)
+extent, origin, spacing = list(points.GetExtent()), list(points.GetOrigin()), points.GetSpacing()
+arrays = points.GetPointData()
+if arrays.HasArray('opacity'):
+    shown = vtk_to_numpy(arrays.GetArray('opacity')) >= 0.5
+elif arrays.HasArray('rgba'):
+    shown = vtk_to_numpy(arrays.GetArray('rgba'))[:, 3] >= 128
+else:  # the background alone is pure white
+    shown = (vtk_to_numpy(arrays.GetArray('rgb')) < 1.0).any(axis=1)
+shown = shown.astype(numpy.uint8)
+if AWAY:
+    beyond = [slice(None)] * 3
+    for axis, position in AWAY:
+        first = int(numpy.floor((position - origin[axis]) / spacing[axis])) + 1 - extent[2 * axis]
+        beyond[2 - axis] = slice(first if first > 0 else 0, None)
+    shown.reshape(points.GetDimensions()[::-1])[tuple(beyond)] = 0
+for axis in range(3):
+    if FLAT != axis:
+        extent[2 * axis + 1] += 1
+        origin[axis] -= spacing[axis] / 2
+cells.SetExtent(extent)
+cells.SetOrigin(origin)
+cells.SetSpacing(spacing)
+for k in range(arrays.GetNumberOfArrays()):
+    cells.GetCellData().AddArray(arrays.GetArray(k))
+shown = numpy_to_vtk(shown, deep=1)
+shown.SetName('shown')
+cells.GetCellData().AddArray(shown)
+'''
+
+
+def points_to_cells(source, name, flat=None, away=()):
+    """The voxels of an image as cells; with `flat`, an axis with one layer, as squares."""
+    given = 'FLAT, AWAY = %r, %r\n' % (flat, list(away))
+    f = ProgrammableFilter(registrationName=name, Input=source)
+    f.OutputDataSetType = 'vtkImageData'
+    f.CopyArrays = 0
+    f.RequestInformationScript = given + VOXELS_EXTENT
+    f.RequestUpdateExtentScript = VOXELS_REQUEST
+    f.Script = given + VOXELS_CELLS
+    return f
+
+
+def shown_cells(cells, name):
+    f = Threshold(registrationName=name, Input=cells)
+    f.Scalars, f.LowerThreshold, f.UpperThreshold = ['CELLS', 'shown'], 0.5, 2.0
+    return f
+
+
+def body_points(reader, panel):
+    """The points (x, y, z) of the opaque voxels, on a coarse grid."""
+    n = panel['dimensions']
+    coarse = ExtractSubset(Input=reader)
+    coarse.VOI = [0, n[0] - 1, 0, n[1] - 1, 0, n[2] - 1]
+    coarse.SampleRateI, coarse.SampleRateJ, coarse.SampleRateK = [largest(1, k // 40) for k in n]
+    cells = points_to_cells(coarse, 'coarse')
+    body = shown_cells(cells, 'coarse body')
+    centres = CellCenters(Input=body, VertexCells=0)
+    found = servermanager.Fetch(centres)
+    points = [found.GetPoint(k) for k in range(found.GetNumberOfPoints())]
+    for proxy in (centres, body, cells, coarse):
+        Delete(proxy)
+    return points
+
+
+def union_of(boxes):
+    return [(smallest if k % 2 == 0 else largest)(b[k] for b in boxes) for k in range(6)]
+
+
+def middle_of(bounds):
+    return [(bounds[2 * a] + bounds[2 * a + 1]) / 2 for a in range(3)]
+
+
+def grid_bounds(panel):
+    """The image with the whole of its outermost voxels."""
+    return [v for n, o, s in zip(panel['dimensions'], panel['origin'], panel['spacing'])
+            for v in (o - s / 2, o + (n - 0.5) * s)]
+
+
+def cut_away(centre):
+    """What AWAY says above."""
+    if CUT is None:
+        return []
+    return [(CUT[1], CUT[2])] if CUT[0] == 'plane' else list(enumerate(centre))
+
+
+# ------------------------------------------------------------------------------------------------------------- views
+
+def make_view(name, parallel):
+    v = CreateView('RenderView')
+    RenameView(name, v)
+    setp(v, UseColorPaletteForBackground=0, BackgroundColorMode='Single Color', Background=[1.0, 1.0, 1.0],
+         UseGradientBackground=0, CenterAxesVisibility=0, OrientationAxesVisibility=0, StereoType='Crystal Eyes',
+         CameraParallelProjection=int(parallel), UseFXAA=1)
+    if parallel:
+        setp(v, InteractionMode='2D')
+    return v
+
+
+def place_camera(v, bounds, aspect, room):
+    """Moves back along CAMERA until the box fills the view below `room`, the share that the caption takes."""
+    length = math.sqrt(CAMERA[0] ** 2 + CAMERA[1] ** 2 + CAMERA[2] ** 2)
+    back = [c / length for c in CAMERA]
+    right = [back[2] / math.hypot(back[0], back[2]), 0.0, -back[0] / math.hypot(back[0], back[2])]
+    up = [back[1] * right[2], back[2] * right[0] - back[0] * right[2], -back[1] * right[0]]
+    middle = middle_of(bounds)
+    corners = []  # in the camera's own axes
+    for k in range(8):
+        p = [bounds[2 * a + (k >> a & 1)] - middle[a] for a in range(3)]
+        corners.append([total(x * y for x, y in zip(p, axis)) for axis in (right, up, back)])
+    angle = 24.0
+    slope = math.tan(math.radians(angle / 2))
+    # Perspective shows the near corners larger, so the box's middle is not the picture's: settle shift and distance.
+    away = 4.0 * math.sqrt(total((bounds[2 * a + 1] - bounds[2 * a]) ** 2 for a in range(3)))
+    shift = [0.0, 0.0]
+    for _ in range(20):
+        seen = [[c[a] / ((away - c[2]) * slope) for c in corners] for a in range(2)]
+        box = [f(values) for values in seen for f in (smallest, largest)]
+        grow = largest((box[1] - box[0]) / (1.86 * aspect), (box[3] - box[2]) / (1.9 - 2.0 * room))
+        away *= grow
+        shift = [(box[0] + box[1]) / 2 * slope * away / grow, (box[2] + box[3]) / 2 * slope * away / grow]
+    shift[1] += room * slope * away
+    target = [m + shift[0] * r + shift[1] * u for m, r, u in zip(middle, right, up)]
+    setp(v, CameraViewAngle=angle, CameraFocalPoint=target, CenterOfRotation=middle, CameraViewUp=[0.0, 1.0, 0.0],
+         CameraPosition=[t + away * b for t, b in zip(target, back)], CameraParallelScale=slope * away)
+
+
+def show_caption(text, v):
+    label = Text(registrationName='Caption: ' + text, Text='\n' + text)
+    d = Show(label, v, 'TextSourceRepresentation')
+    for place in ('Upper Center', 'UpperCenter'):
+        try:
+            d.WindowLocation = place
+            break
+        except ValueError:
+            pass
+    setp(d, Color=TEXT, FontSize=20, FontFamily='Arial', Bold=0, Shadow=0)
+
+
+def show_label(text, position, v):
+    """Text that begins at a point of the scene and always faces the viewer."""
+    label = Text(registrationName='Label: ' + text, Text=text)
+    d = Show(label, v, 'TextSourceRepresentation')
+    setp(d, TextPropMode='Billboard 3D Text', BillboardPosition=position, Color=TEXT, FontSize=16, FontFamily='Arial',
+         Bold=0, Shadow=0)
+
+
+def show_lines(source, v):
+    d = Show(source, v)
+    d.SetRepresentationType('Wireframe')
+    d.ColorArrayName = [None, '']
+    setp(d, AmbientColor=LINES, DiffuseColor=LINES, Ambient=1.0, Diffuse=0.0, LineWidth=1.2)
+
+
+def show_cells(source, v, array, relief):
+    """Shows cells in the colours that they hold."""
+    d = Show(source, v)
+    d.SetRepresentationType('Surface')
+    d.ColorArrayName = ['CELLS', array]
+    d.LookupTable = GetColorTransferFunction(array)
+    d.MapScalars = 0
+    setp(d, Ambient=1.0 - relief, Diffuse=relief, Specular=0.0, Interpolation='Flat')
+    return d
+
+
+def show_volume(panel, reader, array, centre, v):
+    name = os.path.splitext(panel['file'])[0]
+    cells = points_to_cells(reader, name + ': voxels', away=cut_away(centre))
+    show_cells(shown_cells(cells, name + ': cut open'), v, array, RELIEF)
+    # One white light that goes with the camera, a little above it; ParaView's own three are tinted.
+    v.UseLight = 0
+    light = AddLight(view=v)
+    setp(light, Coords='Camera', Type='Directional', Position=[-0.25, 0.6, 1.0], FocalPoint=[0.0, 0.0, 0.0],
+         Intensity=1.0, DiffuseColor=[1.0, 1.0, 1.0])
+    bounds = grid_bounds(panel)
+    frame = Box(registrationName=name + ': frame', Center=middle_of(bounds),
+                XLength=bounds[1] - bounds[0], YLength=bounds[3] - bounds[2], ZLength=bounds[5] - bounds[4])
+    show_lines(Outline(registrationName=name + ': outline', Input=frame), v)
+    out = 0.05 * largest(bounds[2 * a + 1] - bounds[2 * a] for a in range(3))
+    x, y, z = middle_of(bounds)
+    show_label('x', [x, bounds[2] - 1.6 * out, bounds[5] + out], v)
+    show_label('y', [bounds[0] - 1.6 * out, y, bounds[5]], v)
+    show_label('z', [bounds[1] + out, bounds[2] - out, z], v)
+    if array == 'rgba':  # ready for who prefers ParaView's own volume rendering: click on the reader's eye
+        d = Show(reader, v, 'UniformGridRepresentation')
+        d.SetRepresentationType('Volume')
+        d.ColorArrayName = ['POINTS', 'rgba']
+        d.LookupTable = GetColorTransferFunction('rgba')
+        d.ScalarOpacityFunction = GetOpacityTransferFunction('rgba')
+        setp(d, MapScalars=0, ScalarOpacityUnitDistance=smallest(panel['spacing']), VolumeRenderingMode='Smart', Shade=0)
+        Hide(reader, v)
+
+
+def turned_slice(panel, reader, axis, index, move):
+    """One layer of voxels, turned to face the viewer."""
+    name = '%s: %s slice' % (os.path.splitext(panel['file'])[0], 'xyz'[axis])
+    n = panel['dimensions']
+    layer = ExtractSubset(registrationName=name, Input=reader)
+    layer.VOI = [v for a in range(3) for v in ((index, index) if a == axis else (0, n[a] - 1))]
+    turned = Transform(registrationName=name + ', turned', Input=points_to_cells(layer, name + ', squares', flat=axis))
+    setp(turned, TransformAllInputVectors=0)  # three numbers a voxel are a colour here, no direction to be turned
+    turned.Transform.Rotate = ([0.0, 90.0, 0.0], [-90.0, 0.0, 0.0], [0.0, 0.0, 0.0])[axis]
+    turned.Transform.Translate = move
+    HideInteractiveWidgets(turned.Transform)
+    return turned
+
+
+def show_slices(panel, reader, array, centre, v, aspect):
+    """The layers at the centre side by side: xy, xz, and zy, the first letter to the right and the second up."""
+    name = os.path.splitext(panel['file'])[0]
+    bounds, n = grid_bounds(panel), panel['dimensions']
+    edge = [bounds[2 * a + 1] - bounds[2 * a] for a in range(3)]
+    gap = 0.12 * largest(edge)
+    left, top = 0.0, largest(edge[1], edge[2])
+    turned = []
+    for axis, right, up in ((2, 0, 1), (1, 0, 2), (0, 2, 1)):
+        o, s = panel['origin'][axis], panel['spacing'][axis]
+        index = smallest(largest(int(math.floor((centre[axis] - o) / s + 1e-9)), 0), n[axis] - 1)
+        at = o + index * s
+        # After the turn the image's axes `right` and `up` lie along x and y, and `axis` along z, or against it.
+        move = [left - bounds[2 * right], (top - edge[up]) / 2 - bounds[2 * up], -at if axis == 2 else at]
+        turned.append(turned_slice(panel, reader, axis, index, move))
+        text = '%.2f' % at
+        show_label('%s%s,  %s = %s' % ('xyz'[right], 'xyz'[up], 'xyz'[axis], '0.00' if text == '-0.00' else text),
+                   [left, (top - edge[up]) / 2 - 0.13 * top, 0.0], v)
+        left += edge[right] + gap
+    together = AppendDatasets(registrationName=name + ': slices', Input=turned)
+    show_cells(together, v, array, 0.0)
+    surface = ExtractSurface(registrationName=name + ': slices, surface', Input=together)
+    frames = FeatureEdges(registrationName=name + ': slices, frames', Input=surface)
+    setp(frames, BoundaryEdges=1, FeatureEdges=0, NonManifoldEdges=0, ManifoldEdges=0, Coloring=0)
+    show_lines(frames, v)
+    place_parallel(v, [0.0, left - gap, -0.2 * top, top], aspect)
+
+
+def place_parallel(v, box, aspect):
+    x, y = (box[0] + box[1]) / 2, (box[2] + box[3]) / 2
+    half = 0.5 * largest(box[3] - box[2], (box[1] - box[0]) / aspect) * 1.06
+    far = 10.0 * largest(half, 1.0)
+    setp(v, CameraPosition=[x, y, far], CameraFocalPoint=[x, y, 0.0], CameraViewUp=[0.0, 1.0, 0.0],
+         CameraParallelScale=half, CenterOfRotation=[x, y, 0.0])
+
+
+def show_image(panel, reader, array, v, aspect):
+    """An image of one layer, straight on."""
+    squares = points_to_cells(reader, os.path.splitext(panel['file'])[0] + ': pixels', flat=2)
+    show_cells(squares, v, array, 0.0)
+    bounds = grid_bounds(panel)
+    room = 0.08 * (bounds[3] - bounds[2])
+    place_parallel(v, [bounds[0], bounds[1], bounds[2], bounds[3] + room], aspect)
+
+
+# ------------------------------------------------------------------------------------------------------------ figure
+
+SLICES = 0.3  # the share of a panel's height that its slices take
+
+
+def is_image(panel):
+    return panel['dimensions'][2] == 1
+
+
+def default_size(columns, rows):
+    """As many pixels as fit the panels' shapes, within what a display or a page holds."""
+    width = smallest(800, 3200 // columns)
+    heights = []
+    for panel in PANELS:
+        b = grid_bounds(panel)
+        heights.append(width * (1.08 * (b[3] - b[2]) / (b[1] - b[0]) if is_image(panel) else 1.25))
+    height = smallest(largest(largest(heights), 0.3 * width), 2.0 * width)
+    return [width * columns, rows * int(height + 0.5)]
+
+
+def split_cell(layout, cell, parts, horizontally):
+    """Splits a cell of the layout into equal parts, and returns them from the left or from the top."""
+    cells = []
+    while parts > 1:
+        first = (layout.SplitHorizontal if horizontally else layout.SplitVertical)(cell, 1.0 / parts)
+        cells.append(first)
+        cell, parts = first + 1, parts - 1
+    return cells + [cell]
+
+
+def prepare_colours():
+    """Fixed ranges for who colours by another array, so that two volumes can be compared; no fog in `rgba`."""
+    setp(GetColorTransferFunction('ambient_occlusion'), AutomaticRescaleRangeMode='Never', ColorSpace='RGB',
+         RGBPoints=[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], ScalarRangeInitialized=1.0)
+    setp(GetColorTransferFunction('rgba'), AutomaticRescaleRangeMode='Never')
+    setp(GetOpacityTransferFunction('rgba'), ScalarRangeInitialized=1,
+         Points=[v for x, y in ((0.0, 0.0), (127.0, 0.0), (128.0, 1.0), (255.0, 1.0)) for v in (x, y, 0.5, 0.0)])
+
+
+def centre_of(solids):
+    """Where the volumes are cut and sliced, unless CUT says otherwise: half of what is in them lies on either side.
+
+    The middle of their bounds could fall between two bodies; this layer always goes through one of them.
+    """
+    points = [point for panel, reader in solids for point in body_points(reader, panel)]
+    if points:
+        centre = [sorted(point[a] for point in points)[(len(points) - 1) // 2] for a in range(3)]
+    else:
+        centre = middle_of(grid_bounds(solids[0][0]))
+    for a in range(3):  # on to the next face between voxels, so that no rounding decides what is cut off
+        o, s = solids[0][0]['origin'][a], solids[0][0]['spacing'][a]
+        centre[a] = o + (math.floor((centre[a] - o) / s + 0.5) + 0.5) * s
+    if CUT is not None and CUT[0] == 'octant' and CUT[1] is not None:
+        centre = list(CUT[1])
+    if CUT is not None and CUT[0] == 'plane':
+        centre[CUT[1]] = CUT[2]
+    return centre
+
+
+def build_figure():
+    """Builds the layout; returns it and the picture's size."""
+    if not PANELS:
+        stop('this state has no volume to show')
+    columns = len(PANELS) if len(PANELS) <= 3 else int(math.ceil(math.sqrt(len(PANELS))))
+    rows = -(-len(PANELS) // columns)
+    size = list(SIZE or default_size(columns, rows))
+    shape = (size[0] / columns) / (size[1] / rows)
+
+    prepare_colours()
+    readers = [read_panel(panel) for panel in PANELS]
+    arrays = [colour_array(reader, panel) for reader, panel in zip(readers, PANELS)]
+    solids = [(panel, reader) for panel, reader in zip(PANELS, readers) if not is_image(panel)]
+    centre = centre_of(solids) if solids else None
+    whole = union_of([grid_bounds(panel) for panel, _ in solids]) if solids else None
+
+    layout = CreateLayout(name='Figure')
+    cells = [cell for row in split_cell(layout, 0, rows, False) for cell in split_cell(layout, row, columns, True)]
+    first = None
+    for panel, reader, array, cell in zip(PANELS, readers, arrays, cells):
+        name = panel['caption'] or panel['file']
+        v = make_view(name, is_image(panel))
+        if is_image(panel):
+            AssignViewToLayout(view=v, layout=layout, hint=cell)
+            show_image(panel, reader, array, v, shape)
+        else:
+            upper = layout.SplitVertical(cell, 1.0 - SLICES)
+            AssignViewToLayout(view=v, layout=layout, hint=upper)
+            show_volume(panel, reader, array, centre, v)
+            place_camera(v, whole, shape / (1.0 - SLICES), 0.07)
+            if first is None:
+                first = v
+            else:  # turning one volume turns them all
+                AddCameraLink(first, v, 'camera of ' + name)
+            s = make_view('Slices: ' + name, True)
+            AssignViewToLayout(view=s, layout=layout, hint=upper + 1)
+            show_slices(panel, reader, array, centre, s, shape / SLICES)
+        if panel['caption']:
+            show_caption(panel['caption'], v)
+    layout.SetSize(size)
+    SetActiveSource(readers[0])
+    return layout, size
+
+
+def save_picture(layout, size):
+    folder = os.path.abspath(sys.argv[1]) if len(sys.argv) > 1 else HERE
+    target = os.path.normpath(os.path.join(folder, SCREENSHOT))
+    if not os.path.isdir(os.path.dirname(target)):
+        os.makedirs(os.path.dirname(target))
+    SaveScreenshot(target, layout, ImageResolution=size, SeparatorWidth=0, SeparatorColor=[1.0, 1.0, 1.0])
+    print('wrote ' + target)
+
+
+paraview.simple._DisableFirstRenderCameraReset()
+FIGURE = build_figure()
+if __name__ == '__main__' and SCREENSHOT is not None:  # under pvbatch and pvpython, not in the program
+    save_picture(*FIGURE)
