@@ -21,7 +21,7 @@ mod vertices;
 pub use file::{FileError, Sidecar, decode, encode};
 pub use sampling::{Sampler, Sequence, cube_to_ball, square_to_disk};
 pub use site::Site;
-pub use vertices::{ambient_occlusion, at_vertices};
+pub use vertices::{ambient_occlusion, at_vertices, error_estimate};
 
 /// How ambient occlusion is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]

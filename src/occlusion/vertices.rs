@@ -50,3 +50,10 @@ pub fn at_vertices<const D: usize>(
     })?;
     Ok(values)
 }
+
+/// The root mean square over all values of the standard error that so many independent samples have. Scrambled Sobol'
+/// points do better, so for them this is an upper estimate.
+pub fn error_estimate(values: &[f32], samples: u64) -> f64 {
+    let variance = |&v: &f32| f64::from(v) * (1.0 - f64::from(v)) / samples as f64;
+    (values.iter().map(variance).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}

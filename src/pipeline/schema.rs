@@ -8,3 +8,91 @@ use super::spec::PipelineSpec;
 pub fn schema() -> serde_json::Value {
     schemars::schema_for!(PipelineSpec).to_value()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use serde::de::DeserializeOwned;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::pipeline::spec::*;
+    use crate::pipeline::{Axis, Plane, yaml};
+
+    /// The words that the decoder proposes where it meets one that nobody would use.
+    fn decoder_knows<T: DeserializeOwned>(text: &str) -> BTreeSet<String> {
+        let tree = yaml::parse(text).unwrap();
+        match yaml::decode::<T>(&tree) {
+            Ok(_) => panic!("{text} was accepted"),
+            Err(problem) => problem.known().iter().map(|&word| word.to_owned()).collect(),
+        }
+    }
+
+    /// The keys or words that a definition allows.
+    fn schema_knows(definition: &Value) -> BTreeSet<String> {
+        if let Some(properties) = definition.get("properties") {
+            assert_eq!(definition["additionalProperties"], Value::Bool(false), "{definition}");
+            return properties.as_object().unwrap().keys().cloned().collect();
+        }
+        if let Some(words) = definition.get("enum") {
+            return words.as_array().unwrap().iter().map(|w| w.as_str().unwrap().to_owned()).collect();
+        }
+        let choices = definition["oneOf"].as_array().unwrap_or_else(|| panic!("neither keys nor words: {definition}"));
+        choices
+            .iter()
+            .flat_map(|choice| match choice.get("const") {
+                Some(word) => BTreeSet::from([word.as_str().unwrap().to_owned()]),
+                None => schema_knows(choice),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn decoder_and_schema_know_the_same_words() {
+        let schema = schema();
+        assert_eq!(decoder_knows::<PipelineSpec>("{zzz: 1}"), schema_knows(&schema));
+        let definitions = schema["$defs"].as_object().unwrap();
+        for (name, known) in [
+            ("StageSpec", decoder_knows::<StageSpec>("{zzz: 1}")),
+            ("SceneSpec", decoder_knows::<SceneSpec>("{zzz: 1}")),
+            ("ObjectSpec", decoder_knows::<ObjectSpec>("{zzz: 1}")),
+            ("OcclusionSpec", decoder_knows::<OcclusionSpec>("{zzz: 1}")),
+            ("RenderSpec", decoder_knows::<RenderSpec>("{zzz: 1}")),
+            ("CameraSpec", decoder_knows::<CameraSpec>("{zzz: 1}")),
+            ("WriteSpec", decoder_knows::<WriteSpec>("{zzz: 1}")),
+            ("ParaviewSpec", decoder_knows::<ParaviewSpec>("{zzz: 1}")),
+            ("Plane", decoder_knows::<Plane>("{zzz: 1}")),
+            ("Method", decoder_knows::<Method>("zzz")),
+            ("Projection", decoder_knows::<Projection>("zzz")),
+            ("Shading", decoder_knows::<Shading>("zzz")),
+            ("ArrayName", decoder_knows::<ArrayName>("zzz")),
+            ("Encoding", decoder_knows::<Encoding>("zzz")),
+            ("Compression", decoder_knows::<Compression>("zzz")),
+            ("Reader", decoder_knows::<Reader>("zzz")),
+            ("Axis", decoder_knows::<Axis>("zzz")),
+        ] {
+            assert!(!known.is_empty(), "{name}");
+            assert_eq!(known, schema_knows(&definitions[name]), "{name}");
+        }
+    }
+
+    #[test]
+    fn every_key_is_explained() {
+        fn check(path: &str, value: &Value) {
+            if let Some(properties) = value.get("properties").and_then(Value::as_object) {
+                for (key, property) in properties {
+                    // The key of a stage is explained at the stage's own definition.
+                    let explained = property.get("description").is_some() || property.get("$ref").is_some();
+                    assert!(explained, "{path}.{key} has no description");
+                }
+            }
+            match value {
+                Value::Object(map) => map.iter().for_each(|(key, inner)| check(&format!("{path}.{key}"), inner)),
+                Value::Array(items) => items.iter().for_each(|inner| check(path, inner)),
+                _ => {}
+            }
+        }
+        check("", &schema());
+    }
+}

@@ -119,7 +119,7 @@ impl Resolver {
             Some(stage) if wanted.contains(&stage.kind()) => Ok(*stage),
             Some(stage) => {
                 let kinds = wanted.join(" or ");
-                Err(Invalid::new(path, format!("`{id}` is a {} stage; expected a {kinds}", stage.kind())))
+                Err(Invalid::new(path, format!("`{id}` is a stage of kind {}; expected {kinds}", stage.kind())))
             }
             None if self.all_ids.contains(id) => {
                 Err(Invalid::new(path, format!("`{id}` doesn't come before this stage; move it up")))

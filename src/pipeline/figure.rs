@@ -1,0 +1,61 @@
+//! A plan's ParaView figure as the state that shows it.
+
+use super::build::camera;
+use super::files::{PROGRAM, beside, holds, paraview, write_whole};
+use super::plan::{FigurePlan, Plan};
+use super::spec::Reader;
+use super::{Axis, Cut, RunError};
+use crate::volume::Grid;
+
+/// Writes the state, if it isn't there already. Returns its length, and whether it was.
+pub(super) fn write(plan: &Plan, figure: &FigurePlan) -> Result<(u64, bool), RunError> {
+    let mut panels = Vec::with_capacity(figure.writes.len());
+    for &write in &figure.writes {
+        let write = &plan.writes[write];
+        let render = &plan.renders[write.render];
+        let grid: Grid = match plan.scenes[render.scene].dimension {
+            3 => camera::<3>(&render.camera)?.grid(render.dimensions),
+            _ => camera::<4>(&render.camera)?.grid(render.dimensions),
+        };
+        let file = match figure.reader {
+            Reader::Vti => &write.vti,
+            Reader::Raw => &write.raw,
+        };
+        let caption = match render.occlusion {
+            Some(_) if figure.writes.len() > 1 => "with ambient occlusion".to_owned(),
+            None if figure.writes.len() > 1 => "without ambient occlusion".to_owned(),
+            _ => String::new(),
+        };
+        let caption = write.caption.clone().unwrap_or(caption);
+        panels.push(paraview::Panel { file: beside(&figure.state, file.as_deref().unwrap_or("".as_ref())), caption, grid });
+    }
+    let state = paraview::state(&paraview::Figure {
+        title: plan.name.clone(),
+        program: PROGRAM.to_owned(),
+        panels,
+        source: match figure.reader {
+            Reader::Vti => paraview::Source::Vti,
+            Reader::Raw => paraview::Source::Raw,
+        },
+        cut: match figure.cut {
+            Cut::None => paraview::Cut::None,
+            Cut::Octant => paraview::Cut::Octant { corner: None },
+            Cut::Plane(plane) => paraview::Cut::Plane {
+                axis: match plane.plane {
+                    Axis::X => paraview::Axis::X,
+                    Axis::Y => paraview::Axis::Y,
+                    Axis::Z => paraview::Axis::Z,
+                },
+                at: plane.at,
+            },
+        },
+        screenshot: figure.screenshot.as_ref().map(|s| beside(&figure.state, s)),
+        size: None,
+    });
+    let path = plan.out.join(&figure.state);
+    let cached = holds(&path, state.as_bytes());
+    if !cached {
+        write_whole(&path, state.as_bytes())?;
+    }
+    Ok((state.len() as u64, cached))
+}

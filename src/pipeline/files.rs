@@ -1,0 +1,276 @@
+//! The files of a run: which numbers of a picture, a mesh or an occlusion go where.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::plan::{Computation, OcclusionPlan, OcclusionSource, Plan, Samples, WritePlan};
+use super::prepare::sidecar_path;
+use super::spec;
+use super::work::Stale;
+use crate::export::vti::{self, ArraySpec, VtiWriter};
+use crate::export::{self, AtomicFile, Error, png, raw::RawWriter, vtu};
+use crate::geometry::widen;
+use crate::mesh::Mesh;
+use crate::occlusion::{self, Sidecar};
+use crate::render::{Camera, Channel, Picture};
+use crate::volume::{Array, Grid, Kind, Values};
+
+/// Name and version, as files record it.
+pub(super) const PROGRAM: &str = concat!("ao4d ", env!("CARGO_PKG_VERSION"));
+
+/// A finished file: the write it belongs to, its kind, its path in the output folder, and its length.
+pub(super) type Finished = (usize, &'static str, PathBuf, u64);
+
+/// The open files of one picture.
+pub(super) struct PictureFiles {
+    channels: Vec<Channel>,
+    opacity: usize,
+    vti: Vec<(usize, PathBuf, VtiWriter<AtomicFile>, Vec<usize>)>,
+    raw: Vec<(usize, PathBuf, RawWriter<AtomicFile>, usize)>,
+    png: Vec<(usize, PathBuf, AtomicFile)>,
+    slices: Option<(png::Slices, usize)>,
+}
+
+impl PictureFiles {
+    /// Opens those files of a render that have to be made.
+    pub fn create(plan: &Plan, render: usize, stale: &Stale, grid: &Grid, mesh_hash: &str) -> Result<Self, Error> {
+        let dimension = plan.scenes[plan.renders[render].scene].dimension;
+        // What is seen is counted by opacity, so that is always made.
+        let mut channels = vec![Channel::Opacity];
+        let mut place = |channel: Channel| {
+            channels.iter().position(|&c| c == channel).unwrap_or_else(|| {
+                channels.push(channel);
+                channels.len() - 1
+            })
+        };
+        let (mut vti, mut raw, mut png) = (Vec::new(), Vec::new(), Vec::new());
+        let mut slices = None;
+        for (i, write) in plan.writes.iter().enumerate().filter(|(_, w)| w.render == render) {
+            if let Some(file) = write.vti.as_ref().filter(|_| stale.vti[i]) {
+                let specs: Vec<ArraySpec> = write.arrays.iter().map(|&c| array_spec(c, dimension)).collect();
+                let out = AtomicFile::create(plan.out.join(file))?;
+                let writer = VtiWriter::new(out, grid, &specs, &vti_settings(plan, write, mesh_hash))?;
+                vti.push((i, file.clone(), writer, write.arrays.iter().map(|&c| place(c)).collect()));
+            }
+            if let Some(file) = write.raw.as_ref().filter(|_| stale.raw[i]) {
+                let out = AtomicFile::create(plan.out.join(file))?;
+                raw.push((i, file.clone(), RawWriter::new(out, grid), place(Channel::Rgb)));
+            }
+            if let Some(file) = write.png.as_ref().filter(|_| stale.png[i]) {
+                png.push((i, file.clone(), AtomicFile::create(plan.out.join(file))?));
+                slices.get_or_insert_with(|| (png::Slices::new(grid), place(Channel::Rgba)));
+            }
+        }
+        Ok(Self { channels, opacity: 0, vti, raw, png, slices })
+    }
+
+    /// What the files need of each slab, in this order.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// Writes some layers to all files; returns how many of their voxels see something.
+    pub fn add_slab(&mut self, first: usize, slab: &[Array]) -> Result<u64, Error> {
+        for (_, file, writer, places) in &mut self.vti {
+            for (array, &place) in places.iter().enumerate() {
+                writer.write_slab(array, first, &slab[place].values).map_err(AtomicFile::name_in(file))?;
+            }
+        }
+        for (_, file, writer, place) in &mut self.raw {
+            if let Values::F32(rgb) = &slab[*place].values {
+                writer.write_slab(first, rgb).map_err(AtomicFile::name_in(file))?;
+            }
+        }
+        if let Some((slices, place)) = &mut self.slices {
+            if let Values::U8(rgba) = &slab[*place].values {
+                slices.add_slab(first, rgba)?;
+            }
+        }
+        Ok(match &slab[self.opacity].values {
+            Values::F32(opacity) => opacity.iter().filter(|&&o| o > 0.0).count() as u64,
+            _ => 0,
+        })
+    }
+
+    /// Completes the files and gives them their names.
+    pub fn finish(self) -> Result<Vec<Finished>, Error> {
+        let mut done = Vec::new();
+        for (write, file, writer, _) in self.vti {
+            let length = writer.finish().map_err(AtomicFile::name_in(&file))?.commit()?;
+            done.push((write, "vti", file, length));
+        }
+        for (write, file, writer, _) in self.raw {
+            let length = writer.finish().map_err(AtomicFile::name_in(&file))?.commit()?;
+            done.push((write, "raw", file, length));
+        }
+        for (write, file, mut out) in self.png {
+            if let Some((slices, _)) = &self.slices {
+                png::write(&mut out, &[slices]).map_err(AtomicFile::name_in(&file))?;
+            }
+            done.push((write, "png", file, out.commit()?));
+        }
+        Ok(done)
+    }
+}
+
+fn array_spec(channel: Channel, dimension: usize) -> ArraySpec {
+    let kind = match channel {
+        Channel::Rgba => Kind::U8,
+        Channel::Object => Kind::U16,
+        _ => Kind::F32,
+    };
+    let components = if dimension == 3 { channel.components::<3>() } else { channel.components::<4>() };
+    ArraySpec::new(channel.name(), kind, components)
+}
+
+fn vti_settings(plan: &Plan, write: &WritePlan, mesh_hash: &str) -> vti::Settings {
+    let render = &plan.renders[write.render];
+    let scene = &plan.scenes[render.scene];
+    let occlusion = render.occlusion.map(|o| match &plan.occlusions[o].source {
+        OcclusionSource::Compute(computation) => json!(computation),
+        OcclusionSource::Load(_) => json!("loaded"),
+    });
+    let settings = json!({
+        "seed": plan.seed,
+        "scene": { "dimension": scene.dimension, "mesh": mesh_hash },
+        "occlusion": occlusion,
+        "camera": render.camera,
+        "dimensions": render.dimensions,
+        "shading": render.shading,
+    });
+    vti::Settings {
+        encoding: match write.encoding {
+            spec::Encoding::Appended => vti::Encoding::Appended,
+            spec::Encoding::Inline => vti::Encoding::Inline,
+        },
+        compression: match write.compression {
+            spec::Compression::None => vti::Compression::None,
+            spec::Compression::Zlib => vti::Compression::Zlib,
+            spec::Compression::Lz4 => vti::Compression::Lz4,
+        },
+        field_data: vec![
+            ("program".to_owned(), PROGRAM.to_owned()),
+            ("pipeline".to_owned(), plan.name.clone()),
+            ("settings".to_owned(), settings.to_string()),
+        ],
+        ..vti::Settings::default()
+    }
+}
+
+/// Writes an occlusion's values and what stands beside them. Returns the length of the values' file.
+pub(super) fn write_occlusion(
+    path: &Path,
+    values: &[f32],
+    occlusion: &OcclusionPlan,
+    seed: u64,
+    mesh_hash: &str,
+) -> Result<u64, Error> {
+    let mut sidecar = Sidecar {
+        count: values.len(),
+        method: "loaded".to_owned(),
+        samples: None,
+        seed,
+        max_distance: f32::INFINITY,
+        error_estimate: 0.0,
+        mesh: mesh_hash.to_owned(),
+        program: PROGRAM.to_owned(),
+    };
+    if let OcclusionSource::Compute(Computation { method, samples, max_distance, seed }) = &occlusion.source {
+        sidecar.method = method.as_str().to_owned();
+        sidecar.seed = *seed;
+        sidecar.max_distance = max_distance.map_or(f32::INFINITY, |d| d as f32);
+        if let Samples::Fixed(n) = samples {
+            sidecar.samples = u32::try_from(*n).ok();
+            sidecar.error_estimate = occlusion::error_estimate(values, *n);
+        }
+    }
+    // The values last: they are what others look for.
+    write_whole(&sidecar_path(path), sidecar.to_yaml().as_bytes())?;
+    write_whole(path, &occlusion::encode(values))
+}
+
+/// Writes a file in one piece.
+pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<u64, Error> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(bytes).map_err(Error::from).map_err(AtomicFile::name_in(path))?;
+    file.commit()
+}
+
+/// Writes a scene's mesh as a camera sees it; returns the file's length and how many simplices had to be left out. A
+/// 3D scene's mesh is written where it is.
+pub(super) fn write_mesh<const D: usize>(
+    path: &Path,
+    mesh: &Mesh<D>,
+    camera: &Camera<D>,
+    values: Option<&[f32]>,
+) -> Result<(u64, usize), Error> {
+    let mut before = vec![true; mesh.vertices.len()];
+    let mut points = vec![[0.0f32; 3]; mesh.vertices.len()];
+    for (i, vertex) in mesh.vertices.iter().enumerate() {
+        if D == 3 {
+            points[i] = std::array::from_fn(|a| vertex[a]);
+        } else {
+            let (image, distance) = camera.project(vertex);
+            let image = image.map(|x| x as f32);
+            before[i] = distance > 0.0 && image.iter().all(|x| x.is_finite());
+            points[i] = if before[i] { image } else { [0.0; 3] };
+        }
+    }
+    let shown: Vec<usize> =
+        (0..mesh.simplices.len()).filter(|&s| mesh.simplices[s].iter().all(|&v| before[v as usize])).collect();
+    let coordinates = |vectors: &[crate::geometry::Vector<D>]| -> Vec<f32> {
+        vectors.iter().flat_map(|v| widen(v).iter().map(|&x| x as f32).collect::<Vec<_>>()).collect()
+    };
+    let mut object = vec![0u16; mesh.vertices.len()];
+    for (i, o) in mesh.objects.iter().enumerate() {
+        object[o.vertices.clone()].fill(i as u16 + 1);
+    }
+    let mut arrays = vec![
+        Array::new("position", D, coordinates(&mesh.vertices)),
+        Array::new("normal", D, coordinates(&mesh.normals)),
+        Array::new("object", 1, object),
+    ];
+    if let Some(values) = values {
+        arrays.push(Array::new("ambient_occlusion", 1, values.to_vec()));
+    }
+    let mut file = AtomicFile::create(path)?;
+    if D == 3 {
+        let cells: Vec<[u32; 3]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+        vtu::write(&mut file, &points, vtu::Cells::Triangles(&cells), &arrays, &[])
+    } else {
+        let cells: Vec<[u32; 4]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+        vtu::write(&mut file, &points, vtu::Cells::Tetrahedra(&cells), &arrays, &[])
+    }
+    .map_err(AtomicFile::name_in(path))?;
+    Ok((file.commit()?, mesh.simplices.len() - shown.len()))
+}
+
+/// Why a picture shows nothing.
+pub(super) fn nothing_seen<const D: usize>(picture: &Picture<D>, id: &str) -> String {
+    let behind = |v: &u32| picture.camera.project(&picture.tracer.mesh().vertices[*v as usize]).1 <= 0.0;
+    let why = if picture.tracer.mesh().simplices.iter().flatten().all(behind) {
+        "the scene lies wholly behind the camera; turn the camera, or move it back"
+    } else {
+        "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"
+    };
+    format!("render {id} shows background only: {why}")
+}
+
+/// The path of a file in the output folder, as a state in the same folder names it.
+pub(super) fn beside(state: &Path, file: &Path) -> String {
+    let up = state.parent().map_or(0, |p| p.components().count());
+    let mut path = "../".repeat(up);
+    let names: Vec<String> = file.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+    path.push_str(&names.join("/"));
+    path
+}
+
+/// Whether a file holds just these bytes already.
+pub(super) fn holds(path: &Path, bytes: &[u8]) -> bool {
+    std::fs::metadata(path).is_ok_and(|m| m.len() == bytes.len() as u64)
+        && std::fs::read(path).is_ok_and(|found| found == bytes)
+}
+
+pub(super) use export::paraview;
