@@ -27,7 +27,11 @@ fn volume(dimensions: [usize; 3]) -> Volume {
             Array::new("ambient_occlusion", 1, (0..n).map(float).collect::<Vec<_>>()),
             Array::new("object", 1, (0..n).map(|i| (i % 65536) as u16).collect::<Vec<_>>()),
             Array::new("normal", 4, (0..4 * n).map(|i| float(i) - 0.5).collect::<Vec<_>>()),
-            Array::new("depth", 1, (0..n).map(|i| if i % 5 == 0 { f32::INFINITY } else { float(i) }).collect::<Vec<_>>()),
+            Array::new(
+                "depth",
+                1,
+                (0..n).map(|i| if i % 5 == 0 { f32::INFINITY } else { float(i) }).collect::<Vec<_>>(),
+            ),
         ],
         field_data: vec![
             ("pipeline".into(), "name: \"ä & <b>\"\nstages: []\n".into()),
@@ -69,8 +73,7 @@ fn every_encoding_and_compression_reads_back() {
 #[test]
 fn slabs_give_the_same_bytes_as_the_whole() {
     let volume = volume([9, 5, 7]);
-    let specs: Vec<_> =
-        volume.arrays.iter().map(|a| ArraySpec::new(&a.name, a.values.kind(), a.components)).collect();
+    let specs: Vec<_> = volume.arrays.iter().map(|a| ArraySpec::new(&a.name, a.values.kind(), a.components)).collect();
     for encoding in ENCODINGS {
         for compression in COMPRESSIONS {
             let settings = settings(encoding, compression, &volume);

@@ -203,7 +203,8 @@ mod tests {
         let mut figure = figure();
         let text = state(&figure);
         assert!(text.contains("    {'file': 'with.vti', 'caption': 'with',\n"));
-        let grid = "'dimensions': [50, 40, 30], 'origin': [-0.98, -0.5, 0.3333333333333333], 'spacing': [0.04, 1e-7, 2.0]}";
+        let grid =
+            "'dimensions': [50, 40, 30], 'origin': [-0.98, -0.5, 0.3333333333333333], 'spacing': [0.04, 1e-7, 2.0]}";
         assert_eq!(text.matches(grid).count(), 2);
         assert_eq!(line(&text, "SOURCE"), "SOURCE = 'vti'");
         assert_eq!(line(&text, "CUT"), "CUT = None");

@@ -9,6 +9,8 @@ use crate::volume::Grid;
 
 /// Writes the state, if it isn't there already. Returns its length, and whether it was.
 pub(super) fn write(plan: &Plan, figure: &FigurePlan) -> Result<(u64, bool), RunError> {
+    let with = figure.writes.iter().filter(|&&w| plan.renders[plan.writes[w].render].occlusion.is_some()).count();
+    let mixed = figure.writes.len() == 2 && with == 1;
     let mut panels = Vec::with_capacity(figure.writes.len());
     for &write in &figure.writes {
         let write = &plan.writes[write];
@@ -21,13 +23,17 @@ pub(super) fn write(plan: &Plan, figure: &FigurePlan) -> Result<(u64, bool), Run
             Reader::Vti => &write.vti,
             Reader::Raw => &write.raw,
         };
-        let caption = match render.occlusion {
-            Some(_) if figure.writes.len() > 1 => "with ambient occlusion".to_owned(),
-            None if figure.writes.len() > 1 => "without ambient occlusion".to_owned(),
-            _ => String::new(),
+        let caption = match (figure.writes.len(), render.occlusion) {
+            (1, _) => String::new(),
+            (2, Some(_)) if mixed => "with ambient occlusion".to_owned(),
+            (2, None) if mixed => "without ambient occlusion".to_owned(),
+            _ => render.id.replace(['-', '_'], " "),
         };
-        let caption = write.caption.clone().unwrap_or(caption);
-        panels.push(paraview::Panel { file: beside(&figure.state, file.as_deref().unwrap_or("".as_ref())), caption, grid });
+        panels.push(paraview::Panel {
+            file: beside(&figure.state, file.as_deref().unwrap_or("".as_ref())),
+            caption,
+            grid,
+        });
     }
     let state = paraview::state(&paraview::Figure {
         title: plan.name.clone(),

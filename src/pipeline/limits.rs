@@ -18,7 +18,7 @@ pub(super) fn check(plan: &Plan, stale: &Stale) -> Result<(), RunError> {
         let render = &plan.renders[write.render];
         let voxels = render.voxels();
         let layer = voxels / render.dimensions[2] as u64;
-        let vti: u64 = write.arrays.iter().map(|a| a.bytes()).sum();
+        let vti: u64 = write.arrays.iter().map(|a| a.bytes::<4>() as u64).sum();
         if write.vti.is_some() && stale.vti[i] {
             disk = disk.saturating_add(voxels.saturating_mul(vti));
             memory = memory.max(layer.saturating_mul(vti + 16));

@@ -10,26 +10,38 @@
 //!                  \________________ lines _________________/
 //! ```
 
+mod build;
+mod cache;
 mod cut;
 mod document;
 mod error;
-mod object;
+mod figure;
+mod files;
+mod limits;
 mod one_or_many;
 pub mod overrides;
 pub mod plan;
+mod prepare;
+mod report;
+mod run;
 mod schema;
 mod settings;
 pub mod spec;
 mod suggest;
+mod work;
 mod yaml;
 
 use std::path::{Path, PathBuf};
 
+pub use build::AnyMesh;
 pub use cut::{Axis, Cut, Plane};
 pub use document::Document;
 pub use error::{Error, Invalid, Place, Refusal};
 pub use one_or_many::OneOrMany;
 pub use plan::Plan;
+pub use prepare::Prepared;
+pub use report::{FileReport, Report, StageTime};
+pub use run::{RunError, run};
 pub use schema::schema;
 pub use settings::{Backend, BackendError, Settings};
 

@@ -38,7 +38,9 @@ pub enum RunError {
     #[error(transparent)]
     Export(#[from] export::Error),
     /// A picture doesn't fit in memory.
-    #[error("one layer of the largest picture takes {needed} bytes of memory, and {available} are free; make the picture smaller")]
+    #[error(
+        "one layer of the largest picture takes {needed} bytes of memory, and {available} are free; make the picture smaller"
+    )]
     Memory {
         /// Bytes that are needed at once.
         needed: u64,
@@ -144,8 +146,7 @@ impl Run<'_> {
                 mesh.simplices.len()
             ));
         }
-        let mut scene =
-            Scene { mesh, hash: mesh.content_hash(), tracer: OnceCell::new(), values: BTreeMap::new() };
+        let mut scene = Scene { mesh, hash: mesh.content_hash(), tracer: OnceCell::new(), values: BTreeMap::new() };
         let plan = self.plan;
         for &stage in &plan.order {
             let start = Instant::now();
@@ -287,7 +288,11 @@ impl Run<'_> {
             self.report.notes.push(files::nothing_seen(&picture, &render.id));
         }
         let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
-        Ok(format!("{} of {} voxels see something, {rate:.2} million voxels a second", grouped(seen), grouped(render.voxels())))
+        Ok(format!(
+            "{} of {} voxels see something, {rate:.2} million voxels a second",
+            grouped(seen),
+            grouped(render.voxels())
+        ))
     }
 
     /// Writes a write's mesh, and reports what was there already. Its pictures were written with the render.

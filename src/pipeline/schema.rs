@@ -66,7 +66,7 @@ mod tests {
             ("Method", decoder_knows::<Method>("zzz")),
             ("Projection", decoder_knows::<Projection>("zzz")),
             ("Shading", decoder_knows::<Shading>("zzz")),
-            ("ArrayName", decoder_knows::<ArrayName>("zzz")),
+            ("Channel", decoder_knows::<Channel>("zzz")),
             ("Encoding", decoder_knows::<Encoding>("zzz")),
             ("Compression", decoder_knows::<Compression>("zzz")),
             ("Reader", decoder_knows::<Reader>("zzz")),

@@ -7,8 +7,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use super::object::ObjectSpec;
 use super::one_or_many::OneOrMany;
+pub use crate::render::Channel;
+pub use crate::scene::ObjectSpec;
 
 /// A pipeline: named stages that turn a scene into images.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -174,31 +175,11 @@ pub struct WriteSpec {
     /// A quick look at slices through the image: `NAME.png`.
     pub png: Option<String>,
     /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`).
-    pub arrays: Option<Vec<ArrayName>>,
+    pub arrays: Option<Vec<Channel>>,
     /// How the `.vti` stores numbers (default `appended`).
     pub encoding: Option<Encoding>,
     /// How the `.vti` packs them (default `none`).
     pub compression: Option<Compression>,
-}
-
-/// An array of an image.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ArrayName {
-    /// Colour and opacity, 4 x uint8, which volume rendering shows directly.
-    Rgba,
-    /// float32: 1 is open, 0 fully occluded.
-    AmbientOcclusion,
-    /// float32: 1 where something was hit, 0 in the background.
-    Opacity,
-    /// Colour, 3 x float32.
-    Rgb,
-    /// Distance from the eye, float32; infinite in the background.
-    Depth,
-    /// The object's number, uint16; 0 in the background.
-    Object,
-    /// The unit normal, 4 x float32.
-    Normal,
 }
 
 /// How a `.vti` stores numbers.

@@ -3,13 +3,16 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{Fragment, NOTHING, Picture, shading};
 use crate::geometry::widen;
 use crate::volume::{Array, Values};
 
 /// What an array of a picture holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// Colour times ambient occlusion and opacity, 4 x uint8: what volume rendering shows directly.
     Rgba,

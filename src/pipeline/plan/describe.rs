@@ -69,7 +69,7 @@ fn rays(occlusion: &OcclusionPlan, counts: &[SceneCounts]) -> Option<u64> {
 /// Bytes of a write's volumes before compression.
 fn bytes(plan: &Plan, write: &WritePlan) -> u64 {
     let voxels = plan.renders[write.render].voxels();
-    let vti: u64 = write.arrays.iter().filter(|_| write.vti.is_some()).map(|array| array.bytes()).sum();
+    let vti: u64 = write.arrays.iter().filter(|_| write.vti.is_some()).map(|array| array.bytes::<4>() as u64).sum();
     let raw = if write.raw.is_some() { 12 } else { 0 };
     voxels.saturating_mul(vti + raw)
 }
@@ -90,13 +90,7 @@ impl fmt::Display for Description<'_> {
 
 impl Description<'_> {
     fn id(&self, stage: StageRef) -> &str {
-        match stage {
-            StageRef::Scene(i) => &self.plan.scenes[i].id,
-            StageRef::Occlusion(i) => &self.plan.occlusions[i].id,
-            StageRef::Render(i) => &self.plan.renders[i].id,
-            StageRef::Write(i) => &self.plan.writes[i].id,
-            StageRef::Figure(i) => &self.plan.figures[i].id,
-        }
+        self.plan.id(stage)
     }
 
     fn line(&self, stage: StageRef) -> String {

@@ -25,11 +25,11 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 pub use camera::{CameraPlan, ProjectionPlan};
-pub use describe::{Description, SceneCounts};
+pub use describe::{Description, SceneCounts, grouped, size};
 
 use super::Cut;
 use super::error::Invalid;
-use super::spec::{ArrayName, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading};
+use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading};
 
 /// The methods of occlusion that this version has.
 pub const METHODS: &[Method] = &[Method::Sobol, Method::Random];
@@ -81,6 +81,17 @@ impl Plan {
         resolve::resolve(spec, folder, out)
     }
 
+    /// A stage's id.
+    pub fn id(&self, stage: StageRef) -> &str {
+        match stage {
+            StageRef::Scene(i) => &self.scenes[i].id,
+            StageRef::Occlusion(i) => &self.occlusions[i].id,
+            StageRef::Render(i) => &self.renders[i].id,
+            StageRef::Write(i) => &self.writes[i].id,
+            StageRef::Figure(i) => &self.figures[i].id,
+        }
+    }
+
     /// Every file the run leaves in `out`, in the order of the stages.
     pub fn files(&self) -> Vec<&PathBuf> {
         let of_stage = |stage: &StageRef| -> Vec<&PathBuf> {
@@ -99,7 +110,7 @@ impl Plan {
 }
 
 /// A stage, by its place in the plan's list of its kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StageRef {
     /// `scenes[i]`
@@ -243,7 +254,7 @@ pub struct RenderPlan {
     /// How vertex values spread.
     pub shading: Shading,
     /// The arrays that its files need, in their own order, each once.
-    pub arrays: Vec<ArrayName>,
+    pub arrays: Vec<Channel>,
 }
 
 impl RenderPlan {
@@ -272,7 +283,7 @@ pub struct WritePlan {
     /// The quick look.
     pub png: Option<PathBuf>,
     /// What the image data holds, in this order.
-    pub arrays: Vec<ArrayName>,
+    pub arrays: Vec<Channel>,
     /// How it stores numbers.
     pub encoding: Encoding,
     /// How it packs them.
@@ -306,29 +317,4 @@ pub struct FigurePlan {
     pub cut: Cut,
     /// Width and height of the picture in pixels.
     pub size: [usize; 2],
-}
-
-impl ArrayName {
-    /// As the file and the pipeline name it.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            ArrayName::Rgba => "rgba",
-            ArrayName::AmbientOcclusion => "ambient_occlusion",
-            ArrayName::Opacity => "opacity",
-            ArrayName::Rgb => "rgb",
-            ArrayName::Depth => "depth",
-            ArrayName::Object => "object",
-            ArrayName::Normal => "normal",
-        }
-    }
-
-    /// Bytes a voxel.
-    pub fn bytes(self) -> u64 {
-        match self {
-            ArrayName::Rgba | ArrayName::AmbientOcclusion | ArrayName::Opacity | ArrayName::Depth => 4,
-            ArrayName::Rgb => 12,
-            ArrayName::Object => 2,
-            ArrayName::Normal => 16,
-        }
-    }
 }

@@ -5,7 +5,7 @@ use super::resolve::Resolver;
 use super::{FigurePlan, Plan, StageRef, WritePlan};
 use crate::pipeline::Cut;
 use crate::pipeline::error::Invalid;
-use crate::pipeline::spec::{ArrayName, ParaviewSpec, Reader, WriteSpec};
+use crate::pipeline::spec::{Channel, ParaviewSpec, Reader, WriteSpec};
 
 pub(super) fn write(resolver: &mut Resolver, path: &str, id: String, spec: &WriteSpec) -> Result<WritePlan, Invalid> {
     let render = match &spec.input {
@@ -25,7 +25,7 @@ pub(super) fn write(resolver: &mut Resolver, path: &str, id: String, spec: &Writ
         return Err(Invalid::new(path, "names no file; give at least one of vti, raw, vtu, png"));
     }
     let arrays = match &spec.arrays {
-        None => vec![ArrayName::Rgba, ArrayName::AmbientOcclusion, ArrayName::Opacity],
+        None => vec![Channel::Rgba, Channel::AmbientOcclusion, Channel::Opacity],
         Some(arrays) => arrays.clone(),
     };
     if arrays.is_empty() {
@@ -48,8 +48,8 @@ pub(super) fn write(resolver: &mut Resolver, path: &str, id: String, spec: &Writ
     }
     let mut needed = resolver.plan.renders[render].arrays.clone();
     needed.extend(arrays.iter().filter(|_| vti.is_some()));
-    needed.extend(raw.iter().map(|_| ArrayName::Rgb));
-    needed.extend(png.iter().map(|_| ArrayName::Rgba));
+    needed.extend(raw.iter().map(|_| Channel::Rgb));
+    needed.extend(png.iter().map(|_| Channel::Rgba));
     needed.sort_unstable();
     needed.dedup();
     resolver.plan.renders[render].arrays = needed;
@@ -97,7 +97,7 @@ pub(super) fn figure(
     if reader == Reader::Vti {
         for &w in &writes {
             let write = &resolver.plan.writes[w];
-            if !write.arrays.contains(&ArrayName::Rgba) || !write.arrays.contains(&ArrayName::Opacity) {
+            if !write.arrays.contains(&Channel::Rgba) || !write.arrays.contains(&Channel::Opacity) {
                 let message =
                     format!("shows `{}`, whose arrays lack rgba or opacity; add them to its `arrays`", write.id);
                 return Err(Invalid::new(path, message));
