@@ -157,7 +157,7 @@ fn damaged_files_neither_panic_nor_ask_for_memory() {
     let (mut refused, mut taken) = (0, 0);
     for file in &files {
         let interesting: Vec<usize> = (0..file.len()).filter(|&i| file[i] != b' ').collect();
-        for _ in 0..3000 {
+        for _ in 0..1500 {
             let mut bytes = file.clone();
             for _ in 0..1 + random(&mut state) % 3 {
                 let at = interesting[random(&mut state) % interesting.len()];
@@ -175,7 +175,7 @@ fn damaged_files_neither_panic_nor_ask_for_memory() {
         }
     }
     // Most bytes are numbers that nothing protects; both outcomes must have been seen.
-    assert!(refused > 1000 && taken > 1000, "{refused} refused, {taken} taken");
+    assert!(refused > 500 && taken > 500, "{refused} refused, {taken} taken");
 }
 
 #[test]
@@ -262,9 +262,15 @@ fn vtk_reads_what_is_written() {
     let measure = [Array::new("measure", 1, vec![0.1f64, 0.2])];
     let tetrahedra = vtu::Cells::Tetrahedra(&[[0, 1, 2, 3], [1, 2, 3, 4]]);
     let triangles = vtu::Cells::Triangles(&[[0, 1, 2], [1, 2, 4]]);
-    for (name, cells) in [("tetrahedra.vtu", tetrahedra), ("triangles.vtu", triangles)] {
+    let none = vtu::Cells::Tetrahedra(&[]);
+    for (name, points, cells, arrays, measure) in [
+        ("tetrahedra.vtu", &points[..], tetrahedra, &arrays[..], &measure[..]),
+        ("triangles.vtu", &points, triangles, &arrays, &measure),
+        ("points.vtu", &points, none, &arrays, &[]),
+        ("nothing.vtu", &[], none, &[], &[]),
+    ] {
         let mut file = AtomicFile::create(folder.join(name)).unwrap();
-        vtu::write(&mut file, &points, cells, &arrays, &measure).unwrap();
+        vtu::write(&mut file, points, cells, arrays, measure).unwrap();
         file.commit().unwrap();
         count += 1;
     }
@@ -279,29 +285,30 @@ fn what_vtk_writes_is_read() {
     python("theirs", &folder);
     let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).collect();
     files.sort();
-    let mut images = 0;
-    let mut meshes = 0;
-    for path in files {
-        let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
-        let (case, _) = stem.split_once('-').unwrap();
-        let data = vtk::read(&path).unwrap_or_else(|e| panic!("{e}"));
-        // Each case is also written as text by Python itself; all of VTK's ways must say the same.
-        let Some(expected) = stem.split_once('-').filter(|(_, way)| *way != "reference") else { continue };
-        let extension = path.extension().unwrap().to_string_lossy().into_owned();
-        let reference = vtk::read(&folder.join(format!("{}-reference.{extension}", expected.0))).unwrap();
-        let comparison = compare::data_sets(&data, &reference, &Tolerance::default());
-        assert!(comparison.same, "{}:\n{comparison}", path.display());
-        assert!(!comparison.arrays.is_empty());
-        match data {
-            DataSet::Image(image) => {
-                let DataSet::Image(reference) = reference else { panic!("{case}") };
-                assert_eq!(image.field_data, reference.field_data, "{}", path.display());
-                assert_eq!(image.grid, reference.grid);
-                images += 1;
-            }
-            DataSet::Unstructured(mesh) => {
-                assert!(mesh.cells().count() > 0);
-                meshes += 1;
+    let read = |path: &Path| vtk::read(path).unwrap_or_else(|e| panic!("{e}"));
+    let is_reference = |path: &PathBuf| path.to_string_lossy().contains("-reference.");
+    let (references, files): (Vec<_>, Vec<_>) = files.into_iter().partition(is_reference);
+    let (mut images, mut meshes) = (0, 0);
+    for reference in references {
+        let case = reference.file_name().unwrap().to_string_lossy();
+        let case = case.split_once('-').unwrap().0;
+        // Each case is also written as text without VTK's writers; all of VTK's ways must say the same.
+        let expected = read(&reference);
+        for path in files.iter().filter(|p| p.file_name().unwrap().to_string_lossy().starts_with(case)) {
+            let found = read(path);
+            let comparison = compare::data_sets(&found, &expected, &Tolerance::default());
+            assert!(comparison.same && !comparison.arrays.is_empty(), "{}:\n{comparison}", path.display());
+            match (&found, &expected) {
+                (DataSet::Image(found), DataSet::Image(expected)) => {
+                    assert_eq!((found.grid, &found.field_data), (expected.grid, &expected.field_data));
+                    images += 1;
+                }
+                (DataSet::Unstructured(found), DataSet::Unstructured(expected)) => {
+                    assert_eq!(found.field_data, expected.field_data);
+                    assert!(found.cells().count() > 0);
+                    meshes += 1;
+                }
+                _ => panic!("{}", path.display()),
             }
         }
     }

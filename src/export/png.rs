@@ -6,7 +6,7 @@
 //! margin; a grey line frames each slice. An image of one layer is drawn alone and without a frame.
 //!
 //! Slices are picked out of slabs as they come ([`Slices::add_slab`]), so the image itself need not be kept. Several
-//! images, without and with occlusion say, are stacked in rows ([`write`]).
+//! images, without and with occlusion say, are stacked in rows ([`write()`]).
 
 use std::io::Write;
 
@@ -39,6 +39,8 @@ pub struct Slices {
 struct Canvas {
     width: usize,
     height: usize,
+    /// Pixels of white around what it shows, already in width and height.
+    margin: usize,
     rgb: Vec<u8>,
 }
 
@@ -63,7 +65,7 @@ impl Slices {
     pub fn add_slab(&mut self, first_layer: usize, rgba: &[u8]) -> Result<(), Error> {
         let [w, h, d] = self.grid.dimensions;
         let layer = 4 * w * h;
-        if layer == 0 || rgba.len() % layer != 0 || first_layer + rgba.len() / layer > d {
+        if layer == 0 || !rgba.len().is_multiple_of(layer) || first_layer + rgba.len() / layer > d {
             let found = format!("{} bytes from layer {first_layer} on", rgba.len());
             return Err(Error::Shape { array: "rgba".into(), found, expected: format!("up to {d} layers of {layer}") });
         }
@@ -113,6 +115,7 @@ impl Slices {
         let width: usize = PLANES.iter().map(|&p| panel(p).0 + MARGIN).sum();
         let height = PLANES.iter().map(|&p| panel(p).1).max().unwrap_or(0);
         let mut canvas = Canvas::new(width + MARGIN, height + 2 * MARGIN);
+        canvas.margin = MARGIN;
         let mut left = MARGIN;
         for (i, &plane) in PLANES.iter().enumerate() {
             let (w, h) = panel(plane);
@@ -144,17 +147,20 @@ impl Slices {
 pub fn write(sink: impl Write, rows: &[&Slices]) -> Result<(), Error> {
     let rows: Vec<Canvas> = rows.iter().map(|s| s.row()).collect();
     let width = rows.iter().map(|r| r.width).max().unwrap_or(0);
-    // Rows of framed slices bring their margins along; plain images get one between them.
-    let gap = if rows.len() > 1 { MARGIN } else { 0 };
-    let height = rows.iter().map(|r| r.height).sum::<usize>() + gap * rows.len().saturating_sub(1);
-    let mut canvas = Canvas::new(width, height);
-    let mut top = 0;
+    // Between rows there is one margin, be it that of a row of framed slices, which brings its own, or another.
+    let mut tops = Vec::new();
+    let mut height = 0;
     for row in &rows {
+        tops.push(if tops.is_empty() { 0 } else { height + MARGIN - row.margin });
+        height = tops.last().unwrap_or(&0) + row.height - row.margin;
+    }
+    height += rows.last().map_or(0, |r| r.margin);
+    let mut canvas = Canvas::new(width, height);
+    for (row, top) in rows.iter().zip(tops) {
         for (y, line) in row.rgb.chunks_exact(3 * row.width).enumerate() {
             let start = 3 * width * (top + y);
             canvas.rgb[start..start + line.len()].copy_from_slice(line);
         }
-        top += row.height + gap;
     }
     let mut encoder = ::png::Encoder::new(sink, width as u32, height as u32);
     encoder.set_color(::png::ColorType::Rgb);
@@ -167,7 +173,7 @@ pub fn write(sink: impl Write, rows: &[&Slices]) -> Result<(), Error> {
 
 impl Canvas {
     fn new(width: usize, height: usize) -> Self {
-        Self { width, height, rgb: vec![255; 3 * width * height] }
+        Self { width, height, margin: 0, rgb: vec![255; 3 * width * height] }
     }
 
     fn set(&mut self, x: usize, y: usize, color: [u8; 3]) {
@@ -230,6 +236,8 @@ mod tests {
 
     #[test]
     fn axes_point_right_and_up() {
+        let image = slices([4, 5, 6], [1.0; 3], 6);
+        assert_eq!(draw(&[&image, &image]).1, 2 * 300 + 3 * MARGIN);
         for slab in [1, 2, 7] {
             let (width, height, pixels) = draw(&[&slices([4, 5, 6], [1.0; 3], slab)]);
             // 6 voxels to 300 pixels: 50 each.

@@ -4,7 +4,7 @@
 //! in the text. `vtkio` names no components and writes no field data; the points lie in ParaView's 3D, so what they
 //! were in 4D goes into a `position` array.
 
-use std::io::Write;
+use std::io::{self, Write};
 
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells as VtkCells, DataArray, DataSet, ElementType, IOBuffer, Piece,
@@ -29,7 +29,7 @@ pub enum Cells<'a> {
 /// If an array does not have a tuple for each point or cell, two have one name, an index is out of range, or the sink
 /// fails.
 pub fn write(
-    mut sink: impl Write,
+    sink: impl Write,
     points: &[[f32; 3]],
     cells: Cells<'_>,
     point_arrays: &[Array],
@@ -60,10 +60,47 @@ pub fn write(
         data: DataSet::UnstructuredGrid { meta: None, pieces: vec![Piece::Inline(Box::new(piece))] },
         file_path: None,
     };
-    // vtkio wraps an error of the sink; writing into memory first would double the memory, so its text must do.
-    vtk.write_xml(&mut sink).map_err(|e| Error::Mesh(e.to_string()))?;
+    let mut sink = Watched { sink, failure: None };
+    let failed = |e: vtkio::Error| Error::Mesh(e.to_string());
+    if count > 0 {
+        let result = vtk.write_xml(&mut sink);
+        if let Some(cause) = sink.failure.take() {
+            return Err(cause.into());
+        }
+        result.map_err(failed)?;
+    } else {
+        // vtkio leaves out counts of zero, without which VTK reads nothing at all.
+        let mut bytes = Vec::new();
+        vtk.write_xml(&mut bytes).map_err(failed)?;
+        let points = if points.is_empty() { " NumberOfPoints=\"0\"" } else { "" };
+        let piece = format!("<Piece{points} NumberOfCells=\"0\"");
+        sink.sink.write_all(String::from_utf8_lossy(&bytes).replacen("<Piece", &piece, 1).as_bytes())?;
+    }
     sink.flush()?;
     Ok(())
+}
+
+/// A sink that keeps its first error, as vtkio hands on only a text of it.
+struct Watched<W> {
+    sink: W,
+    failure: Option<io::Error>,
+}
+
+impl<W: Write> Write for Watched<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.sink.write(bytes).map_err(|e| {
+            let told = io::Error::from(e.kind());
+            // An interrupted call is tried again, and is no failure.
+            if e.kind() != io::ErrorKind::Interrupted {
+                self.failure.get_or_insert(e);
+            }
+            told
+        })
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.sink.flush()
+    }
 }
 
 /// Arrays as vtkio wants them, after the checks that it leaves out.
@@ -136,12 +173,24 @@ mod tests {
 
     #[test]
     fn triangles_and_nothing() {
-        for triangles in [&[[0, 1, 2]][..], &[]] {
+        for (points, triangles) in [(&POINTS[..], &[[0, 1, 2]][..]), (&POINTS, &[]), (&[], &[])] {
             let mut bytes = Vec::new();
-            let points = if triangles.is_empty() { &[][..] } else { &POINTS[..] };
             write(&mut bytes, points, Cells::Triangles(triangles), &[], &[]).unwrap();
             let vtk::DataSet::Unstructured(grid) = vtk::parse(&bytes).unwrap() else { panic!("no mesh") };
             assert_eq!(grid.simplices::<3>().unwrap(), triangles);
+            assert_eq!(grid.points.len(), points.len());
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_named_as_such() {
+        let full = || std::fs::File::options().write(true).open("/dev/full").unwrap();
+        for cells in [&[[0, 1, 2]][..], &[]] {
+            for sink in [Box::new(full()) as Box<dyn Write>, Box::new(io::BufWriter::new(full()))] {
+                let error = write(sink, &POINTS, Cells::Triangles(cells), &[], &[]).unwrap_err().to_string();
+                assert!(error.contains("No space left on device"), "{error}");
+            }
         }
     }
 

@@ -117,12 +117,16 @@ def check_raw(path, dimensions):
 
 def check_mesh(path):
     mesh = read(vtk.vtkXMLUnstructuredGridReader(), path)
+    if path.stem == "nothing":
+        check(mesh.GetNumberOfPoints() == mesh.GetNumberOfCells() == 0, path.name, "is not empty")
+        return
     third = np.float32(1) / np.float32(3)
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, third], [1, 1, 1]], np.float32)
     check(np.array_equal(vtk_to_numpy(mesh.GetPoints().GetData()), points), path.name, "has other points")
     kind, cells = {
         "tetrahedra": (vtk.VTK_TETRA, [[0, 1, 2, 3], [1, 2, 3, 4]]),
         "triangles": (vtk.VTK_TRIANGLE, [[0, 1, 2], [1, 2, 4]]),
+        "points": (None, []),
     }[path.stem]
     check(mesh.GetNumberOfCells() == len(cells), path.name, mesh.GetNumberOfCells(), "cells")
     for c, expected in enumerate(cells):
@@ -135,7 +139,7 @@ def check_mesh(path):
         "object": np.array([1, 1, 2, 2, 65535], np.uint16),
     }
     check_arrays(path, mesh.GetPointData(), arrays)
-    check_arrays(path, mesh.GetCellData(), {"measure": np.array([0.1, 0.2])})
+    check_arrays(path, mesh.GetCellData(), {"measure": np.array([0.1, 0.2])} if cells else {})
 
 
 def ours(folder):
@@ -266,7 +270,7 @@ def large(n):
 CASES = {
     "types.vti": lambda: image((2, 6, -1, 3, 0, 2), every_type, every_type, with_bits=True),
     "flat.vti": lambda: image((0, 6, 0, 4, 3, 3), every_type),
-    "blocks.vti": lambda: image((0, 63, 0, 63, 0, 15), large),
+    "blocks.vti": lambda: image((0, 63, 0, 63, 0, 7), large),
     "voxel.vti": lambda: image((0, 0, 0, 0, 0, 0), every_type),
     "mesh.vtu": mesh,
     "poly.vtp": poly,

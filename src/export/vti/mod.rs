@@ -198,7 +198,7 @@ impl<W: Write + Seek> VtiWriter<W> {
         }
         let layer = self.grid.layer_len() * spec.components.len();
         let layers = values.len() / layer;
-        if values.len() % layer != 0 || layers > self.grid.dimensions[2] - pending.layers {
+        if !values.len().is_multiple_of(layer) || layers > self.grid.dimensions[2] - pending.layers {
             let left = self.grid.dimensions[2] - pending.layers;
             return Err(shape(&spec.name, format!("{} numbers", values.len()), format!("1 to {left} times {layer}")));
         }

@@ -92,14 +92,14 @@ pub(super) fn array(document: &Document<'_>, node: Node<'_, '_>, tuples: Option<
         } else {
             let expected = count.map(|n| n.checked_mul(kind.size() as u64).ok_or_else(too_large)).transpose()?;
             let bytes = bytes(document, node, &name, expected)?;
-            if bytes.len() % kind.size() != 0 {
+            if !bytes.len().is_multiple_of(kind.size()) {
                 let cause = format!("{} bytes are no whole number of {}", bytes.len(), kind.vtk_name());
                 return Err(Problem::Damaged { array: name, cause });
             }
             kind.decode(&bytes, document.little_endian)
         }
     };
-    if values.len() as u64 % components != 0 {
+    if !(values.len() as u64).is_multiple_of(components) {
         let cause = format!("{} numbers are no whole number of tuples of {components}", values.len());
         return Err(Problem::Damaged { array: name, cause });
     }

@@ -10,8 +10,8 @@
 //! a reader that stops at the first attribute it does not know, as `vtkio`'s does, cannot tell a whole file from a
 //! part of one.
 //!
-//! How a file becomes numbers: [`document`] cuts the XML off the appended bytes and parses it; [`data_array`] turns
-//! one `<DataArray>` into numbers, [`blocks`] undoing compression; [`image`] and [`mesh`] know what the elements mean.
+//! How a file becomes numbers: `document` cuts the XML off the appended bytes and parses it; `data_array` turns
+//! one `<DataArray>` into numbers, `blocks` undoing compression; `image` and `mesh` know what the elements mean.
 //! A file is never trusted: sizes are checked against the bytes at hand before memory is asked for.
 
 mod blocks;
