@@ -19,7 +19,8 @@ pub struct Check {
 impl Check {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         let (pipeline, _settings) = self.options.load(console)?;
-        let description = pipeline.plan.describe(&[]);
+        let counts = pipeline.prepare(|_| true)?.counts();
+        let description = pipeline.plan.describe(&counts);
         if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;
         Ok(Outcome::Done)
     }

@@ -1,5 +1,6 @@
 //! `ao4d run`: run a pipeline and write its files.
 
+use ao4d::pipeline::{RunError, run};
 use clap::Args;
 
 use super::console::Console;
@@ -19,9 +20,17 @@ pub struct Run {
 
 impl Run {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
-        let (pipeline, _settings) = self.options.load(console)?;
-        let _watch = Watch::new(console)?;
-        let _as_json = self.json;
-        Err(Failure::refused(format!("{}: running is not available in this version", pipeline.document.file())))
+        let (pipeline, settings) = self.options.load(console)?;
+        let watch = Watch::new(console)?;
+        let report = run(&pipeline, &settings, &watch).map_err(|error| match error {
+            RunError::Refused(error) => Failure::Refused(Box::new(error)),
+            RunError::Cancelled(_) => Failure::Cancelled,
+            error => Failure::Failed(Box::new(error)),
+        })?;
+        for note in &report.notes {
+            console.note(&format!("note: {note}"));
+        }
+        if self.json { console.json(&report) } else { console.result(&report.to_string()) }?;
+        Ok(Outcome::Done)
     }
 }

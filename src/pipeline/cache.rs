@@ -72,7 +72,6 @@ impl Cache {
 /// The keys of a plan's stages.
 #[derive(Clone, Debug)]
 pub struct Keys {
-    scenes: Vec<String>,
     occlusions: Vec<String>,
     renders: Vec<String>,
 }
@@ -100,7 +99,7 @@ impl Keys {
                 key(&(&scenes[render.scene], occlusion, &render.camera, render.dimensions, render.shading))
             })
             .collect();
-        Self { scenes, occlusions, renders }
+        Self { occlusions, renders }
     }
 
     /// The key of an occlusion file.
@@ -111,11 +110,6 @@ impl Keys {
     /// The key of a file of a render, of this kind, written as `how` says.
     pub fn file(&self, render: usize, kind: &str, how: &impl Serialize) -> String {
         key(&(&self.renders[render], kind, how))
-    }
-
-    /// The key of a scene.
-    pub fn scene(&self, index: usize) -> &str {
-        &self.scenes[index]
     }
 }
 

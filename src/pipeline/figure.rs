@@ -56,7 +56,7 @@ pub(super) fn write(plan: &Plan, figure: &FigurePlan) -> Result<(u64, bool), Run
             },
         },
         screenshot: figure.screenshot.as_ref().map(|s| beside(&figure.state, s)),
-        size: None,
+        size: figure.size,
     });
     let path = plan.out.join(&figure.state);
     let cached = holds(&path, state.as_bytes());

@@ -1,9 +1,12 @@
 //! What a run did: files, times, and what the user should know.
 
+use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::Serialize;
+
+use super::plan::size;
 
 /// A finished run.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -46,5 +49,22 @@ impl Report {
     /// Adds a stage.
     pub fn stage(&mut self, stage: String, time: Duration, detail: String) {
         self.stages.push(StageTime { stage, seconds: time.as_secs_f64(), detail });
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.stages.iter().map(|s| s.stage.chars().count()).max().unwrap_or(0);
+        for StageTime { stage, seconds, detail } in &self.stages {
+            writeln!(f, "{}", format!("{stage:width$}  {seconds:7.3} s  {detail}").trim_end())?;
+        }
+        writeln!(f, "{:width$}  {:7.3} s", "in all", self.seconds)?;
+        let width = self.files.iter().map(|f| f.path.display().to_string().chars().count()).max().unwrap_or(0);
+        writeln!(f, "{}:", self.out.display())?;
+        for FileReport { path, bytes, cached } in &self.files {
+            let unchanged = if *cached { "  unchanged" } else { "" };
+            writeln!(f, "  {:width$}  {:>9}{unchanged}", path.display().to_string(), size(*bytes))?;
+        }
+        Ok(())
     }
 }

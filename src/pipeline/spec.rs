@@ -222,7 +222,7 @@ pub struct ParaviewSpec {
     pub reader: Option<Reader>,
     /// How the volumes are cut open (default `none`).
     pub cut: Option<super::cut::Cut>,
-    /// Width and height of the picture in pixels (default `[1600, 900]`).
+    /// Width and height of the picture in pixels (default: 800 across for each image).
     pub size: Option<Vec<u64>>,
 }
 

@@ -315,6 +315,6 @@ pub struct FigurePlan {
     pub reader: Reader,
     /// How the volumes are cut open.
     pub cut: Cut,
-    /// Width and height of the picture in pixels.
-    pub size: [usize; 2],
+    /// Width and height of the picture in pixels, where they were given.
+    pub size: Option<[u32; 2]>,
 }

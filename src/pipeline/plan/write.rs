@@ -33,7 +33,7 @@ pub(super) fn write(resolver: &mut Resolver, path: &str, id: String, spec: &Writ
     }
     for (i, array) in arrays.iter().enumerate() {
         if arrays[..i].contains(array) {
-            return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.as_str())));
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.name())));
         }
     }
     if vti.is_none() {
@@ -110,7 +110,7 @@ pub(super) fn figure(
         None => None,
     };
     let size = match spec.size.as_deref() {
-        None => [1600, 900],
+        None => None,
         Some(&[width, height]) => {
             for (i, n) in [width, height].into_iter().enumerate() {
                 if !(16..=16_384).contains(&n) {
@@ -118,7 +118,7 @@ pub(super) fn figure(
                     return Err(Invalid::new(format!("{path}.size[{i}]"), message));
                 }
             }
-            [width as usize, height as usize]
+            Some([width as u32, height as u32])
         }
         Some(other) => {
             return Err(Invalid::new(format!("{path}.size"), format!("expected [WIDTH, HEIGHT], found {other:?}")));
