@@ -369,7 +369,7 @@ fn refusals_name_key_value_and_remedy() {
         ),
         (
             json!({"cut_cube": {"min": [0, 0, 0, 0], "max": [1, 1, 1, 1], "cuts": [], "subdivisions": 1000}}),
-            "cut_cube.subdivisions: too many pieces: 1004006004001 cells; the most is 50000000",
+            "cut_cube.subdivisions: too many pieces: a lattice of 1003003001 points or more; the most is 50000000",
         ),
         (
             json!({"extrude": {"mesh": "nut.vtu", "from": 1, "to": 1}}),
