@@ -85,6 +85,7 @@ fn lattice_of<const D: usize>(
     pieces: [u32; D],
 ) -> Result<Lattice<D>, Error> {
     let mut planes: [Vec<f64>; D] = std::array::from_fn(|_| Vec::new());
+    let mut points: u128 = 1;
     for axis in 0..D {
         let (low, high) = (min[axis], max[axis]);
         let mut sides: Vec<f64> = cuts.iter().flat_map(|(from, to)| [from[axis], to[axis]]).collect();
@@ -92,23 +93,23 @@ fn lattice_of<const D: usize>(
         sides.extend([low, high]);
         sides.sort_unstable_by(f64::total_cmp);
         sides.dedup();
-        for pair in sides.windows(2) {
+        let count = |pair: &[f64]| {
             // Rounded up, but 0.1 of 1 in 10 pieces is 1 piece, whatever the last bit says.
             let share = (pair[1] - pair[0]) / (high - low) * f64::from(pieces[axis]);
-            let count = (share - 1e-9).ceil().max(1.0) as u32;
-            check_count("cut_cube.subdivisions", u128::from(count))?;
-            planes[axis].extend(divide(pair[0], pair[1], count));
+            (share - 1e-9).ceil().max(1.0) as u32
+        };
+        // Before anything of that size is made.
+        points *= sides.windows(2).map(|pair| u128::from(count(pair))).sum::<u128>() + 1;
+        if points > u128::from(MAX_SIMPLICES) {
+            let message = format!("too many pieces: a lattice of {points} points or more; the most is {MAX_SIMPLICES}");
+            return Err(Error::invalid("cut_cube.subdivisions", message));
+        }
+        for pair in sides.windows(2) {
+            planes[axis].extend(divide(pair[0], pair[1], count(pair)));
         }
         planes[axis].push(high);
     }
-    let lattice = Lattice { planes };
-    if lattice.point_count() > u128::from(MAX_SIMPLICES) {
-        return Err(Error::invalid(
-            "cut_cube.subdivisions",
-            format!("too many pieces: {} cells; the most is {MAX_SIMPLICES}", lattice.point_count()),
-        ));
-    }
-    Ok(lattice)
+    Ok(Lattice { planes })
 }
 
 fn facets_of_kept<const D: usize>(

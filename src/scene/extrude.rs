@@ -93,8 +93,8 @@ impl ExtrudeSpec {
                 let (points, tetrahedra) = weld(&mesh.points, tetrahedra);
                 let solid = solid(&points, tetrahedra).map_err(|message| input.wrong(message))?;
                 let boundary = solid.boundary();
-                let interval = Chain::interval(self.layers);
                 self.check_size(points.len(), solid.len(), boundary.len())?;
+                let interval = Chain::interval(self.layers);
                 let chain = match self.caps {
                     Some(false) => boundary.times(&interval),
                     _ => solid.boundary_of_product(&interval),

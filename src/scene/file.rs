@@ -5,7 +5,7 @@
 //! array `normal` of as many components, where there is one, is taken for the normals. Vertices keep their order; only STL,
 //! which has none, is welded.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::Error;
 use super::numbers::MAX_SIMPLICES;
@@ -13,7 +13,7 @@ use super::readers::{Cells, Input};
 use crate::mesh::Surface;
 
 /// The surface that the file holds.
-pub fn build<const D: usize>(path: &PathBuf, folder: &Path) -> Result<Surface<D>, Error> {
+pub fn build<const D: usize>(path: &Path, folder: &Path) -> Result<Surface<D>, Error> {
     let input = Input::new("file", folder, path);
     let mesh = input.read()?;
     let position = mesh.vectors::<D>("position", &input)?;

@@ -25,11 +25,6 @@ impl<const D: usize> Lattice<D> {
         Self { planes: std::array::from_fn(planes) }
     }
 
-    /// The number of points, of whatever size.
-    pub fn point_count(&self) -> u128 {
-        self.planes.iter().map(|planes| planes.len() as u128).product()
-    }
-
     /// The index of a point.
     pub fn index(&self, place: &[usize; D]) -> u32 {
         (0..D).fold(0, |index, axis| index * self.planes[axis].len() + place[axis]) as u32

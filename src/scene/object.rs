@@ -75,7 +75,7 @@ pub enum Shape<'a> {
     /// Vertices and simplices listed.
     Simplices(&'a SimplicesSpec),
     /// A surface from a file.
-    File(&'a PathBuf),
+    File(&'a Path),
     /// A three-dimensional mesh swept along the fourth axis.
     Extrude(&'a ExtrudeSpec),
     /// A box from which smaller boxes are cut away.
@@ -137,7 +137,7 @@ impl ObjectSpec {
     pub fn shape(&self) -> Result<Shape<'_>, Error> {
         let shapes = [
             self.simplices.as_ref().map(Shape::Simplices),
-            self.file.as_ref().map(Shape::File),
+            self.file.as_deref().map(Shape::File),
             self.extrude.as_ref().map(Shape::Extrude),
             self.cut_cube.as_ref().map(Shape::CutCube),
             self.r#box.as_ref().map(Shape::Box),
@@ -168,7 +168,7 @@ pub fn build_object<const D: usize>(spec: &ObjectSpec, folder: &Path) -> Result<
     let mut surface = shape.build::<D>(folder)?;
     transform::apply(&spec.transform, &mut surface)?;
     // Coordinates are rounded to single precision afterwards and must survive that.
-    let too_large = |x: &f64| !(x.abs() <= f64::from(f32::MAX));
+    let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);
     if let Some((i, vertex)) = surface.vertices.iter().enumerate().find(|(_, vertex)| vertex.iter().any(too_large)) {
         let axis = vertex.iter().position(too_large).unwrap_or_default();
         let key = if spec.transform.is_empty() { shape.key() } else { "transform" };
