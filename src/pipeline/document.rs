@@ -49,7 +49,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Applies an override, `KEY=VALUE`. What KEY may be: [`overrides`](super::overrides).
+    /// Applies an override, `KEY=VALUE`. What KEY may be: [`overrides`].
     pub fn set(&mut self, assignment: &str) -> Result<(), Error> {
         let origin = Origin::Set(self.sets.len());
         self.sets.push(assignment.to_owned());
