@@ -139,7 +139,7 @@ fn cut_anywhere() {
 fn mutated() {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     let (mut accepted, mut refused) = (0, 0);
-    for _ in 0..20_000 {
+    for _ in 0..8_000 {
         let text = mutate(&mut random);
         match load(&text, &[]) {
             Ok(()) => accepted += 1,
@@ -150,7 +150,7 @@ fn mutated() {
         }
     }
     // Both kinds must occur, or the test tests nothing.
-    assert!(accepted > 300 && refused > 5_000, "{accepted} accepted, {refused} refused");
+    assert!(accepted > 100 && refused > 2_000, "{accepted} accepted, {refused} refused");
 }
 
 #[test]
@@ -164,7 +164,7 @@ fn overrides_mutated() {
     ];
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let mut refused = 0;
-    for _ in 0..5_000 {
+    for _ in 0..2_000 {
         let mut set: Vec<char> = valid[random.random_range(0..valid.len())].chars().collect();
         for _ in 0..random.random_range(0..3) {
             let at = random.random_range(0..=set.len());
@@ -175,7 +175,7 @@ fn overrides_mutated() {
         }
         refused += usize::from(load(PIPELINE, &[set.into_iter().collect()]).is_err());
     }
-    assert!((500..4_900).contains(&refused), "{refused} refused");
+    assert!((200..1_950).contains(&refused), "{refused} refused");
 }
 
 #[test]

@@ -49,7 +49,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Applies an override, `KEY=VALUE`. What KEY may be: [`overrides`](super::overrides).
+    /// Applies an override, `KEY=VALUE`. What KEY may be: [`overrides`].
     pub fn set(&mut self, assignment: &str) -> Result<(), Error> {
         let origin = Origin::Set(self.sets.len());
         self.sets.push(assignment.to_owned());
@@ -64,7 +64,7 @@ impl Document {
     /// Line and column, from 1, of the value at a dotted path, or of its nearest part that is written. None if
     /// an override gave it, or if the path is malformed.
     pub fn locate(&self, path: &str) -> Option<(usize, usize)> {
-        match self.origin(path)? {
+        match self.origin(path)?.0 {
             Origin::File { line, column } => Some((line, column)),
             Origin::Set(_) => None,
         }
@@ -72,8 +72,8 @@ impl Document {
 
     /// The complaint with its line.
     pub fn refuse(&self, invalid: Invalid) -> Error {
-        let origin = self.origin(&invalid.path).unwrap_or(self.root.origin);
         let Invalid { path, message } = invalid;
+        let (origin, path) = self.origin(&path).unwrap_or((self.root.origin, path));
         Error::Refused(Box::new(Refusal { place: self.place(origin), path, message }))
     }
 
@@ -87,20 +87,25 @@ impl Document {
         Path::new(&self.file).parent().map(Path::to_owned).unwrap_or_default()
     }
 
-    fn origin(&self, path: &str) -> Option<Origin> {
-        let mut node = &self.root;
-        let segments = if path.is_empty() { Vec::new() } else { yaml::parse_path(path).ok()? };
-        for segment in &segments {
-            let next = match segment {
+    /// Where the value at a path is, or the nearest part of it that is written; and the path as messages write it.
+    /// `list.2.key` is taken for `list[2].key`.
+    fn origin(&self, path: &str) -> Option<(Origin, String)> {
+        let mut node = Some(&self.root);
+        let mut origin = self.root.origin;
+        let mut segments = if path.is_empty() { Vec::new() } else { yaml::parse_path(path).ok()? };
+        for segment in &mut segments {
+            if let (Segment::Key(key), Some(Value::List(_))) = (&*segment, node.map(|n| &n.value))
+                && let Ok(index) = key.parse()
+            {
+                *segment = Segment::Index(index);
+            }
+            node = node.and_then(|node| match segment {
                 Segment::Key(key) => node.get(key),
                 Segment::Index(index) => node.items().get(*index),
-            };
-            match next {
-                Some(inner) => node = inner,
-                None => break,
-            }
+            });
+            origin = node.map_or(origin, |inner| inner.origin);
         }
-        Some(node.origin)
+        Some((origin, yaml::show_path(&segments)))
     }
 
     fn place(&self, origin: Origin) -> Place {
@@ -127,6 +132,8 @@ mod tests {
         assert_eq!(document.locate("stages[0].render.camera.eye"), Some((3, 7)), "absent: the mapping it would be in");
         let refusal = document.refuse(Invalid::new("stages[0].render.dimensions[0]", "too small"));
         assert_eq!(refusal.to_string(), "p.yaml:3:20: stages[0].render.dimensions[0]: too small");
+        let refusal = document.refuse(Invalid::new("stages.0.render.dimensions.2", "too small"));
+        assert_eq!(refusal.to_string(), "p.yaml:3:26: stages[0].render.dimensions[2]: too small");
         document.set("render.dimensions=[0, 0, 0]").unwrap();
         let refusal = document.refuse(Invalid::new("stages[0].render.dimensions[0]", "too small"));
         assert_eq!(refusal.to_string(), "--set render.dimensions=[0, 0, 0]: stages[0].render.dimensions[0]: too small");

@@ -22,7 +22,9 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         if distance > allowed && prefix {
             distance = allowed; // as good as a tolerable slip
         }
-        if distance <= allowed && best.is_none_or(|(least, _)| distance < least) {
+        // A word of which no letter is right isn't near, however short (`w` for `x`).
+        let some_right = distance < typed.chars().count().min(right.chars().count());
+        if distance <= allowed && some_right && best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, candidate));
         }
     }
@@ -64,9 +66,15 @@ mod tests {
 
     #[test]
     fn nothing_near() {
-        for typed in ["", "fov", "colour", "x", &"samples".repeat(1000)] {
+        for typed in ["", "fov", "colour", "x", "q", &"samples".repeat(1000)] {
             assert_eq!(nearest(typed, KEYS), None, "{typed}");
         }
+    }
+
+    #[test]
+    fn one_letter_is_no_slip_of_another() {
+        assert_eq!(nearest("w", ["x", "y", "z"]), None);
+        assert_eq!(nearest("X", ["x", "y", "z"]), Some("x"));
     }
 
     #[test]

@@ -105,3 +105,85 @@ fn dimensions(path: &str, given: &[u64], dimension: usize) -> Result<[usize; 3],
         None => Err(Invalid::new(path, "more voxels than this computer can address")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::pipeline::{Document, Pipeline};
+
+    const SCENES: &str = "name: p
+stages:
+  - scene: {id: a, objects: []}
+  - occlusion: {id: ao-a, file: a.f32}
+  - scene: {id: b, dimension: 3, objects: []}
+";
+
+    fn pipeline(stages: &str) -> Result<Pipeline, String> {
+        let document = Document::parse("p.yaml", &format!("{SCENES}{stages}")).unwrap();
+        Pipeline::from_document(document, &[], None).map_err(|e| e.to_string())
+    }
+
+    /// The ids of what the last render shows and is darkened by, or the refusal without its place.
+    fn resolved(stages: &str) -> String {
+        match pipeline(stages) {
+            Err(message) => message.split_once(": ").unwrap().1.to_owned(),
+            Ok(Pipeline { plan, .. }) => {
+                let render = plan.renders.last().unwrap();
+                let occlusion = render.occlusion.map_or("none", |o| plan.occlusions[o].id.as_str());
+                format!("{} {occlusion}", plan.scenes[render.scene].id)
+            }
+        }
+    }
+
+    #[test]
+    fn scenes_and_occlusions_find_each_other() {
+        let nearest = "stages[3].render: the nearest scene is `b`, but the nearest occlusion (`ao-a`) is of scene `a`; \
+             say `occlusion: none`, or which by `input`";
+        let foreign = "stages[3].render.occlusion: `ao-a` is the occlusion of scene `a`, and `input` shows scene `b`";
+        for (render, expected) in [
+            ("{dimensions: [2, 2]}", nearest),
+            ("{dimensions: [2, 2], occlusion: none}", "b none"),
+            ("{dimensions: [2, 2], input: b}", "b none"),
+            ("{dimensions: [2, 2, 2], input: a}", "a ao-a"),
+            ("{dimensions: [2, 2, 2], input: ao-a}", "a ao-a"),
+            ("{dimensions: [2, 2, 2], occlusion: ao-a}", "a ao-a"),
+            ("{dimensions: [2, 2, 2], input: ao-a, occlusion: none}", "a none"),
+            ("{dimensions: [2, 2], input: b, occlusion: ao-a}", foreign),
+        ] {
+            assert_eq!(resolved(&format!("  - render: {render}\n")), expected, "{render}");
+        }
+        assert_eq!(resolved("  - occlusion: {}\n  - render: {dimensions: [2, 2, 1]}\n"), "b occlusion-2");
+        assert_eq!(
+            resolved("  - occlusion: {id: x, input: a}\n  - render: {dimensions: [2, 2, 2], input: a}\n"),
+            "a x"
+        );
+    }
+
+    #[test]
+    fn a_render_gathers_what_its_files_need() {
+        let plan = pipeline(
+            "  - render: {id: r, input: a, dimensions: [2, 3, 4], camera: {eye: [0, 0, 0, 2]}}
+  - render: {input: a, dimensions: [2, 3, 4], camera: {eye: [0, 0, 0, 3]}}
+  - write: {input: r, raw: r.raw, arrays: [depth]}
+  - write: {input: r, vti: r.vti, arrays: [opacity, rgba, normal]}
+  - paraview: {input: r, state: vti.py}
+  - paraview: {input: [r, r], state: raw.py, reader: raw}
+",
+        )
+        .unwrap();
+        let warnings: Vec<String> = plan.warnings().map(|w| w.to_string()).collect();
+        let plan = plan.plan;
+        let arrays: Vec<&str> = plan.renders[0].arrays.iter().map(|array| array.as_str()).collect();
+        assert_eq!(arrays, ["rgba", "opacity", "rgb", "normal"]);
+        assert_eq!((plan.figures[0].writes.as_slice(), plan.figures[1].writes.as_slice()), (&[1][..], &[0, 0][..]));
+        assert_eq!(plan.scenes[0].eye, Some(vec![0.0, 0.0, 0.0, 2.0]), "the first render's");
+        assert_eq!(plan.scenes[1].eye, None);
+        assert_eq!(plan.writes.iter().map(|w| w.id.as_str()).collect::<Vec<_>>(), ["write", "write-2"]);
+        let files: Vec<_> = plan.files().iter().map(|file| file.to_str().unwrap()).collect();
+        assert_eq!(files, ["a.f32", "r.raw", "r.vti", "vti.py", "raw.py"]);
+        assert!(
+            warnings.iter().any(|w| w == "p.yaml:7:13: stages[4].render: no `write` stage writes this image"),
+            "{warnings:?}"
+        );
+        assert!(warnings.iter().any(|w| w.ends_with("write.arrays: has no effect without `vti`")), "{warnings:?}");
+    }
+}

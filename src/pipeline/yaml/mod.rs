@@ -16,7 +16,7 @@ mod scalar;
 
 pub(super) use decode::decode;
 pub(super) use parse::parse;
-pub(super) use path::{Segment, parse_path};
+pub(super) use path::{Segment, parse_path, show_path};
 pub(super) use problem::Problem;
 pub(super) use scalar::resolve_plain;
 

@@ -39,7 +39,11 @@ pub fn parse_path(text: &str) -> Result<Vec<Segment>, String> {
 }
 
 /// A path as it is printed.
-pub struct Shown<'a>(pub &'a [Segment]);
+pub fn show_path(segments: &[Segment]) -> String {
+    Shown(segments).to_string()
+}
+
+struct Shown<'a>(&'a [Segment]);
 
 impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -61,7 +65,7 @@ mod tests {
     #[test]
     fn round_trip() {
         for text in ["seed", "ao.samples", "stages[1].render.dimensions[0]", "a[0][1].b"] {
-            assert_eq!(Shown(&parse_path(text).unwrap()).to_string(), text);
+            assert_eq!(show_path(&parse_path(text).unwrap()), text);
         }
     }
 

@@ -8,8 +8,7 @@ use std::fmt;
 
 use serde::de::{self, Expected, Unexpected};
 
-use super::path::Shown;
-use super::{Origin, Segment, shorten};
+use super::{Origin, Segment, shorten, show_path};
 use crate::pipeline::suggest;
 
 /// A refusal on its way out.
@@ -58,7 +57,7 @@ impl Problem {
     /// The dotted path, empty at the top.
     pub fn path(&self) -> String {
         let outwards: Vec<Segment> = self.path.iter().rev().cloned().collect();
-        Shown(&outwards).to_string()
+        show_path(&outwards)
     }
 
     /// The words that would have been accepted where an unknown one stood.
