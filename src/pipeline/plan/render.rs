@@ -172,7 +172,7 @@ stages:
         .unwrap();
         let warnings: Vec<String> = plan.warnings().map(|w| w.to_string()).collect();
         let plan = plan.plan;
-        let arrays: Vec<&str> = plan.renders[0].arrays.iter().map(|array| array.as_str()).collect();
+        let arrays: Vec<&str> = plan.renders[0].arrays.iter().map(|array| array.name()).collect();
         assert_eq!(arrays, ["rgba", "opacity", "rgb", "normal"]);
         assert_eq!((plan.figures[0].writes.as_slice(), plan.figures[1].writes.as_slice()), (&[1][..], &[0, 0][..]));
         assert_eq!(plan.scenes[0].eye, Some(vec![0.0, 0.0, 0.0, 2.0]), "the first render's");
