@@ -2,4 +2,5 @@
 
 pub mod geometry;
 pub mod mesh;
+pub mod occlusion;
 pub mod volume;

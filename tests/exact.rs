@@ -1,0 +1,331 @@
+//! Exact ambient occlusion against values known by other means, in 3D and 4D.
+
+use ao4d::geometry::{Column, Cone, Vector, Vector64, narrow, widen};
+use ao4d::occlusion::exact::{Budget, Hemisphere, visible_fraction};
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+type Simplices<const D: usize> = Vec<[Vector<D>; D]>;
+
+fn axis<const D: usize>(i: usize) -> Vector<D> {
+    Vector::from_fn(|r, _| f32::from(u8::from(r == i)))
+}
+
+/// The exact value at `p`, simplices that contain it sorted out by identity.
+fn value<const D: usize>(p: &Vector<D>, n: &Vector<D>, simplices: &[[Vector<D>; D]]) -> f64 {
+    let incident = simplices.iter().filter_map(|s| {
+        let at = s.iter().position(|v| v == p)?;
+        let mut others = *s;
+        others.swap(at, D - 1);
+        Some(others)
+    });
+    let others = simplices.iter().filter(|s| !s.contains(p)).copied();
+    visible_fraction(p, n, incident, others, Budget::default()).expect("sound input").expect("within the budget")
+}
+
+/// The (D-1)! simplices of the unit cube in the axes `axes`, as steps of 0 or 1 along each axis (Kuhn).
+fn kuhn<const D: usize>(axes: &[usize]) -> Vec<Vec<[usize; D]>> {
+    fn walk<const D: usize>(
+        at: [usize; D],
+        left: &[usize],
+        path: &mut Vec<[usize; D]>,
+        out: &mut Vec<Vec<[usize; D]>>,
+    ) {
+        path.push(at);
+        if left.is_empty() {
+            out.push(path.clone());
+        }
+        for (i, &axis) in left.iter().enumerate() {
+            let mut next = at;
+            next[axis] += 1;
+            let mut rest = left.to_vec();
+            rest.remove(i);
+            walk(next, &rest, path, out);
+        }
+        path.pop();
+    }
+    let mut out = Vec::new();
+    walk([0; D], axes, &mut Vec::new(), &mut out);
+    out
+}
+
+/// The boundary of a box, each edge cut into n.
+fn box_surface<const D: usize>(min: [f32; D], max: [f32; D], n: usize) -> Simplices<D> {
+    let corner = |steps: [usize; D]| {
+        Vector::<D>::from_fn(|r, _| {
+            if steps[r] == n { max[r] } else { min[r] + (max[r] - min[r]) * steps[r] as f32 / n as f32 }
+        })
+    };
+    let mut simplices = Vec::new();
+    for fixed in 0..D {
+        let free: Vec<usize> = (0..D).filter(|&i| i != fixed).collect();
+        let paths = kuhn::<D>(&free);
+        for side in [0, n] {
+            for cell in 0..n.pow(D as u32 - 1) {
+                let mut base = [0; D];
+                base[fixed] = side;
+                let mut rest = cell;
+                for &i in &free {
+                    base[i] = rest % n;
+                    rest /= n;
+                }
+                for path in &paths {
+                    simplices.push(std::array::from_fn(|k| corner(std::array::from_fn(|i| base[i] + path[k][i]))));
+                }
+            }
+        }
+    }
+    simplices
+}
+
+/// The boundary of the cross-polytope, its simplices' edges cut into 2 `levels` times and its vertices moved to the sphere.
+fn ball<const D: usize>(centre: Vector<D>, radius: f64, levels: usize) -> Simplices<D> {
+    let mut simplices: Vec<[Vector64<D>; D]> = (0..1usize << D)
+        .map(|signs| std::array::from_fn(|i| widen(&axis::<D>(i)) * if signs >> i & 1 == 1 { -1.0 } else { 1.0 }))
+        .collect();
+    for _ in 0..levels {
+        simplices = simplices.iter().flat_map(|s| bisect_longest(s)).collect();
+    }
+    simplices.iter().map(|s| s.map(|v| narrow(&(v.normalize() * radius + widen(&centre))))).collect()
+}
+
+/// Cuts a simplex at the midpoints of its edges: corners, and (4D) the octahedron between them in four.
+fn bisect_longest<const D: usize>(s: &[Vector64<D>; D]) -> Simplices64<D> {
+    let m = |i: usize, j: usize| (s[i] + s[j]) / 2.0;
+    let pick = |list: &[Vector64<D>]| -> [Vector64<D>; D] { std::array::from_fn(|i| list[i]) };
+    if D == 3 {
+        let (a, b, c) = (m(0, 1), m(1, 2), m(2, 0));
+        return vec![pick(&[s[0], a, c]), pick(&[a, s[1], b]), pick(&[c, b, s[2]]), pick(&[a, b, c])];
+    }
+    let (ab, ac, ad, bc, bd, cd) = (m(0, 1), m(0, 2), m(0, 3), m(1, 2), m(1, 3), m(2, 3));
+    vec![
+        pick(&[s[0], ab, ac, ad]),
+        pick(&[s[1], ab, bc, bd]),
+        pick(&[s[2], ac, bc, cd]),
+        pick(&[s[3], ad, bd, cd]),
+        pick(&[ab, cd, ac, ad]),
+        pick(&[ab, cd, ad, bd]),
+        pick(&[ab, cd, bd, bc]),
+        pick(&[ab, cd, bc, ac]),
+    ]
+}
+type Simplices64<const D: usize> = Vec<[Vector64<D>; D]>;
+
+fn random_vector<const D: usize>(rng: &mut ChaCha8Rng) -> Vector<D> {
+    Vector::from_fn(|_, _| rng.random::<f32>() * 2.0 - 1.0)
+}
+
+/// Random simplices with edges of about `size`, around the origin but not at it.
+fn soup<const D: usize>(rng: &mut ChaCha8Rng, count: usize, size: f32) -> Simplices<D> {
+    (0..count)
+        .map(|_| {
+            let centre = random_vector::<D>(rng).normalize() * (0.3 + rng.random::<f32>());
+            std::array::from_fn(|_| centre + random_vector::<D>(rng) * size)
+        })
+        .collect()
+}
+
+/// Mean visibility and its standard error by rays, each tested against every cone with exact signs.
+fn monte_carlo<const D: usize>(
+    rng: &mut ChaCha8Rng,
+    p: &Vector<D>,
+    n: &Vector<D>,
+    simplices: &[[Vector<D>; D]],
+    rays: usize,
+) -> (f64, f64) {
+    let cones: Vec<Cone<D>> = simplices
+        .iter()
+        .map(|s| match s.iter().position(|v| v == p) {
+            None => Cone::of_simplex(p, s),
+            Some(at) => {
+                Cone::new(std::array::from_fn(|i| if i == at { Column::vector(-n) } else { Column::edge(s[i], *p) }))
+            }
+        })
+        .collect();
+    let normal = widen(n).normalize();
+    let mut open = 0usize;
+    for _ in 0..rays {
+        // A point of the unit ball of the horizon, lifted to the hemisphere: cosine-weighted.
+        let direction = loop {
+            let v = Vector64::<D>::from_fn(|_, _| rng.random::<f64>() * 2.0 - 1.0);
+            let flat = v - normal * v.dot(&normal);
+            // The flat part of a point of the cube is uniform near the centre only where the cube reaches: use the ball.
+            if v.norm() <= 1.0 {
+                let radius = rng.random::<f64>().powf(1.0 / (D as f64 - 1.0));
+                let tangent = flat.normalize() * radius;
+                break tangent + normal * (1.0 - radius * radius).max(0.0).sqrt();
+            }
+        };
+        let direction = narrow(&direction);
+        open += usize::from(!cones.iter().any(|cone| cone.contains(&direction)));
+    }
+    let mean = open as f64 / rays as f64;
+    (mean, (mean * (1.0 - mean) / rays as f64).sqrt().max(1.0 / rays as f64))
+}
+
+macro_rules! in_3d_and_4d {
+    ($($name:ident)*) => { $(
+        mod $name {
+            #[test] fn in_3d() { super::checks::$name::<3>() }
+            #[test] fn in_4d() { super::checks::$name::<4>() }
+        }
+    )* };
+}
+
+in_3d_and_4d! {
+    nothing_occludes_nothing orthant half_space fold enclosed_in_a_box enclosed_in_a_ball convex_body_alone
+    random_soup_by_rays subdivided_occluder
+}
+
+mod checks {
+    use super::*;
+
+    pub fn nothing_occludes_nothing<const D: usize>() {
+        let p = Vector::<D>::from_element(0.3);
+        assert!((value(&p, &(axis(0) * 7.0 + axis(1)), &[]) - 1.0).abs() < 1e-14);
+    }
+
+    pub fn orthant<const D: usize>() {
+        let expected = 1.0 - 0.5f64.powi(D as i32 - 1);
+        for at in 0..D {
+            let orthant: [Vector<D>; D] = std::array::from_fn(axis);
+            let a = value(&Vector::zeros(), &axis(at), &[orthant]);
+            assert!((a - expected).abs() < 1e-14, "{a}");
+            let a = value(&Vector::zeros(), &axis(at), &[orthant; 3]);
+            assert!((a - expected).abs() < 1e-14, "the same three times: {a}");
+            assert_eq!(value(&Vector::zeros(), &-axis::<D>(at), &[orthant]), 1.0);
+        }
+    }
+
+    pub fn half_space<const D: usize>() {
+        let half: Simplices<D> = (0..1usize << (D - 1))
+            .map(|signs| {
+                std::array::from_fn(|i| if i > 0 && signs >> (i - 1) & 1 == 1 { -axis::<D>(i) } else { axis(i) })
+            })
+            .collect();
+        for at in 1..D {
+            let a = value(&Vector::zeros(), &axis(at), &half);
+            assert!((a - 0.5).abs() < 1e-14, "{a}");
+        }
+        assert_eq!(value(&Vector::zeros(), &axis(0), &half), 0.0);
+        assert!((value(&Vector::zeros(), &-axis::<D>(0), &half) - 1.0).abs() < 1e-14);
+        // A plane tilted by 60 degrees leaves (1 + cos) / 2, whatever the dimension.
+        let tilted = axis::<D>(0) * 3.0f32 + axis(1) * 4.0;
+        let a = value(&Vector::zeros(), &tilted, &half);
+        assert!((a - (1.0 - 0.6) / 2.0).abs() < 1e-14, "{a}");
+    }
+
+    pub fn fold<const D: usize>() {
+        // Two half-hyperplanes, towards x_0 and towards x_1, both along all other axes: each a fan around p.
+        let p = Vector::<D>::zeros();
+        let mut simplices = Vec::new();
+        for wall in [0, 1] {
+            for signs in 0..1usize << (D - 2) {
+                simplices.push(std::array::from_fn(|i| match i {
+                    0 => p,
+                    1 => axis(wall),
+                    _ => axis::<D>(i) * if signs >> (i - 2) & 1 == 1 { -1.0 } else { 1.0 },
+                }));
+            }
+        }
+        let concave = value(&p, &(axis(0) + axis(1)), &simplices);
+        assert!((concave - 0.5f64.sqrt()).abs() < 1e-14, "{concave}");
+        let convex = value(&p, &-(axis::<D>(0) + axis(1)), &simplices);
+        assert!((convex - 1.0).abs() < 1e-14, "{convex}");
+    }
+
+    pub fn enclosed_in_a_box<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut worst = 0.0f64;
+        for n in 1..=3 {
+            let body = box_surface::<D>([-1.0; D], std::array::from_fn(|i| 1.0 + i as f32), n);
+            let mut points = vec![Vector::zeros(), axis(0) * 0.5, Vector::from_element(0.25)];
+            points.extend((0..3).map(|_| random_vector::<D>(&mut rng) * 0.999));
+            for p in points {
+                for normal in [axis(0), axis(D - 1), Vector::from_element(1.0), random_vector(&mut rng)] {
+                    worst = worst.max(value(&p, &normal, &body).abs());
+                }
+            }
+        }
+        println!("largest |A| inside boxes: {worst:e}");
+        assert!(worst < 1e-12);
+    }
+
+    pub fn enclosed_in_a_ball<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(2);
+        let mut worst = 0.0f64;
+        for levels in 0..=2 {
+            let body = ball::<D>(Vector::zeros(), 1.0, levels);
+            for _ in 0..4 {
+                let p = random_vector::<D>(&mut rng) * 0.4;
+                worst = worst.max(value(&p, &random_vector(&mut rng), &body).abs());
+            }
+        }
+        println!("largest |A| inside balls: {worst:e}");
+        assert!(worst < 1e-12);
+    }
+
+    pub fn convex_body_alone<const D: usize>() {
+        let mut worst = 0.0f64;
+        for n in 1..=2 {
+            let body = box_surface::<D>([-1.0; D], std::array::from_fn(|i| 1.0 + i as f32), n);
+            for p in body.iter().flatten() {
+                let centre = Vector::<D>::from_fn(|i, _| i as f32 / 2.0);
+                worst = worst.max((value(p, &(p - centre), &body) - 1.0).abs());
+            }
+        }
+        println!("largest |A - 1| on convex bodies: {worst:e}");
+        assert!(worst < 1e-13);
+    }
+
+    pub fn random_soup_by_rays<const D: usize>() {
+        for seed in 0..6 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut simplices = soup::<D>(&mut rng, 12, 0.5);
+            let p = simplices[0][0];
+            simplices.push(std::array::from_fn(|i| if i == 1 { p } else { random_vector(&mut rng) }));
+            let n = random_vector::<D>(&mut rng);
+            let exact = value(&p, &n, &simplices);
+            let (mean, error) = monte_carlo(&mut rng, &p, &n, &simplices, 40_000);
+            println!("{exact:.6} {mean:.6} +- {error:.6}");
+            assert!((exact - mean).abs() < 4.5 * error, "{exact} {mean} {error}");
+        }
+    }
+
+    pub fn subdivided_occluder<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut worst = 0.0f64;
+        for _ in 0..20 {
+            // Coordinates on a coarse grid, so that midpoints are exact.
+            let grid = |simplices: Simplices<D>| -> Simplices<D> {
+                simplices.iter().map(|s| s.map(|v| v.map(|x| (x * 1024.0).round() / 1024.0))).collect()
+            };
+            let whole = grid(soup::<D>(&mut rng, 5, 0.8));
+            let mut pieces = whole.clone();
+            for _ in 0..2 {
+                pieces = pieces
+                    .iter()
+                    .flat_map(|s| bisect_longest(&s.map(|v| widen(&v))))
+                    .map(|s| s.map(|v| narrow(&v)))
+                    .collect();
+            }
+            let p = Vector::zeros();
+            let n = random_vector::<D>(&mut rng);
+            let both: Simplices<D> = whole.iter().chain(&pieces).copied().collect();
+            let (a, b, c) = (value(&p, &n, &whole), value(&p, &n, &pieces), value(&p, &n, &both));
+            worst = worst.max((a - b).abs()).max((a - c).abs());
+        }
+        println!("largest change by subdivision: {worst:e}");
+        assert!(worst < 1e-12);
+    }
+}
+
+#[test]
+fn bad_input_is_refused() {
+    let p = Vector::<4>::zeros();
+    assert!(Hemisphere::new(&p, &p).is_none());
+    assert!(Hemisphere::new(&p, &(axis(0) * f32::NAN)).is_none());
+    let mut hemisphere = Hemisphere::new(&p, &axis(0)).unwrap();
+    assert!(hemisphere.add(&[axis(0) * f32::INFINITY; 4]).is_none());
+    assert!(hemisphere.add_incident(&[axis(0); 2]).is_none());
+    assert_eq!(hemisphere.occluders(), 0);
+}
