@@ -173,7 +173,7 @@ macro_rules! in_3d_and_4d {
 
 in_3d_and_4d! {
     nothing_occludes_nothing orthant half_space fold enclosed_in_a_box enclosed_in_a_ball convex_body_alone
-    random_soup_by_rays subdivided_occluder
+    random_soup_by_rays subdivided_occluder complementary_parts_of_an_enclosure copies_moved_by_an_ulp
 }
 
 mod checks {
@@ -316,6 +316,92 @@ mod checks {
         }
         println!("largest change by subdivision: {worst:e}");
         assert!(worst < 1e-12);
+    }
+
+    /// A convex surface around p tiles its directions: what one part of it leaves open the rest covers. Turned boxes
+    /// have planes that all but coincide; points close to walls, edges and corners see them nearly from within.
+    pub fn complementary_parts_of_an_enclosure<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut worst = 0.0f64;
+        for round in 0..60 {
+            let mut body = box_surface::<D>([-1.0; D], [1.0; D], 1 + round % 2);
+            let (turned, scale, shift) =
+                ([false, true][round / 2 % 2], [1.0, 1e-6, 1e5][round / 4 % 3], [0.0, 100.0][round / 12 % 2]);
+            let angle = rng.random::<f64>();
+            let place = |v: &Vector64<D>| {
+                let mut v = *v;
+                if turned {
+                    let (sin, cos) = angle.sin_cos();
+                    for i in 1..D {
+                        (v[i - 1], v[i]) = (v[i - 1] * cos - v[i] * sin, v[i - 1] * sin + v[i] * cos);
+                    }
+                }
+                narrow(&((v + Vector64::from_element(shift)) * scale))
+            };
+            for simplex in &mut body {
+                *simplex = simplex.map(|v| place(&widen(&v)));
+            }
+            // From the middle to within 1e-6 of a wall, of two, of three (and a corner).
+            for close in 0..=D {
+                let p = Vector64::<D>::from_fn(|i, _| {
+                    if i < close {
+                        1.0 - [0.1, 1e-4, 1e-6][round % 3] * (1.0 + rng.random::<f64>())
+                    } else {
+                        rng.random::<f64>() - 0.5
+                    }
+                });
+                if shift > 0.0 && close > 0 && round % 3 == 2 {
+                    continue; // Within an ulp of the wall.
+                }
+                let p = place(&p);
+                let n = random_vector::<D>(&mut rng);
+                let (mut part, mut rest) = (Vec::new(), Vec::new());
+                for simplex in &body {
+                    if rng.random() { part.push(*simplex) } else { rest.push(*simplex) }
+                }
+                let (a, b) = (value(&p, &n, &part), value(&p, &n, &rest));
+                worst = worst.max((a + b - 1.0).abs());
+                if (a + b - 1.0).abs() > 1e-12 {
+                    println!("{round} {close} {a} {b} {:e}", a + b - 1.0);
+                }
+            }
+        }
+        println!("largest error of complements: {worst:e}");
+        assert!(worst < 1e-12);
+    }
+
+    /// Occluders beside copies of themselves that differ in the last bits: nothing may jump.
+    pub fn copies_moved_by_an_ulp<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut worst = 0.0f64;
+        for round in 0..40 {
+            let mut whole = soup::<D>(&mut rng, 3, 0.8);
+            whole.extend(box_surface::<D>(std::array::from_fn(|i| 0.2 + i as f32 / 8.0), [0.9; D], 1));
+            let mut copies = whole.clone();
+            for copy in 0..1 + round % 3 {
+                for simplex in &whole {
+                    copies.push(simplex.map(|v| {
+                        v.map(|x| match rng.random_range(0..3 + copy) {
+                            0 => x.next_up(),
+                            1 => x.next_down(),
+                            _ => x,
+                        })
+                    }));
+                }
+            }
+            let p = Vector::zeros();
+            let n = random_vector::<D>(&mut rng);
+            let (a, b) = (value(&p, &n, &whole), value(&p, &n, &copies));
+            worst = worst.max((a - b).abs());
+            let mut shuffled = copies.clone();
+            for i in (1..shuffled.len()).rev() {
+                shuffled.swap(i, rng.random_range(0..=i));
+            }
+            let c = value(&p, &n, &shuffled);
+            assert!((b - c).abs() < 1e-12, "order matters: {b} {c}");
+        }
+        println!("largest change by copies an ulp away: {worst:e}");
+        assert!(worst < 1e-6);
     }
 }
 
