@@ -110,6 +110,16 @@ fn bisect_longest<const D: usize>(s: &[Vector64<D>; D]) -> Simplices64<D> {
 }
 type Simplices64<const D: usize> = Vec<[Vector64<D>; D]>;
 
+/// Turned by an angle in each plane of neighbouring axes.
+fn turned<const D: usize>(v: &Vector64<D>, angle: f64) -> Vector64<D> {
+    let (sin, cos) = angle.sin_cos();
+    let mut v = *v;
+    for i in 1..D {
+        (v[i - 1], v[i]) = (v[i - 1] * cos - v[i] * sin, v[i - 1] * sin + v[i] * cos);
+    }
+    v
+}
+
 fn random_vector<const D: usize>(rng: &mut ChaCha8Rng) -> Vector<D> {
     Vector::from_fn(|_, _| rng.random::<f32>() * 2.0 - 1.0)
 }
@@ -325,16 +335,13 @@ mod checks {
         let mut worst = 0.0f64;
         for round in 0..60 {
             let mut body = box_surface::<D>([-1.0; D], [1.0; D], 1 + round % 2);
-            let (turned, scale, shift) =
+            let (turn, scale, shift) =
                 ([false, true][round / 2 % 2], [1.0, 1e-6, 1e5][round / 4 % 3], [0.0, 100.0][round / 12 % 2]);
             let angle = rng.random::<f64>();
             let place = |v: &Vector64<D>| {
                 let mut v = *v;
-                if turned {
-                    let (sin, cos) = angle.sin_cos();
-                    for i in 1..D {
-                        (v[i - 1], v[i]) = (v[i - 1] * cos - v[i] * sin, v[i - 1] * sin + v[i] * cos);
-                    }
+                if turn {
+                    v = turned(&v, angle);
                 }
                 narrow(&((v + Vector64::from_element(shift)) * scale))
             };
@@ -414,4 +421,55 @@ fn bad_input_is_refused() {
     assert!(hemisphere.add(&[axis(0) * f32::INFINITY; 4]).is_none());
     assert!(hemisphere.add_incident(&[axis(0); 2]).is_none());
     assert_eq!(hemisphere.occluders(), 0);
+}
+
+/// Prints the time per vertex for closed bodies beside a partner; run with `--release --ignored --nocapture`.
+#[test]
+#[ignore = "a sweep that measures time"]
+fn time_per_vertex() {
+    fn measure<const D: usize>(name: &str, simplices: &Simplices<D>, centre: Vector<D>) {
+        let mut points: Vec<Vector<D>> = simplices.iter().flatten().copied().collect();
+        points.sort_by(|a, b| a.iter().partial_cmp(b.iter()).unwrap());
+        points.dedup();
+        let step = points.len().div_ceil(40);
+        let start = std::time::Instant::now();
+        let (mut count, mut sum, mut slowest) = (0, 0.0, 0.0f64);
+        for p in points.iter().step_by(step) {
+            let began = std::time::Instant::now();
+            sum += value(p, &(p - centre), simplices);
+            slowest = slowest.max(began.elapsed().as_secs_f64());
+            count += 1;
+        }
+        println!(
+            "{name}: {} simplices, {} vertices, {:.2} ms a vertex (slowest {:.2}), mean {:.6}",
+            simplices.len(),
+            points.len(),
+            start.elapsed().as_secs_f64() * 1e3 / count as f64,
+            slowest * 1e3,
+            sum / count as f64
+        );
+    }
+    for n in 3..=4 {
+        let mut scene = box_surface::<4>([-1.0; 4], [1.0; 4], n);
+        scene.extend(box_surface::<4>([1.1, -0.7, -0.6, -0.5], [1.9, 0.8, 0.9, 0.7], n));
+        measure(&format!("tesseract and box, n = {n}"), &scene, Vector::zeros());
+        for simplex in &mut scene {
+            *simplex = simplex.map(|v| narrow(&turned(&widen(&v), 0.7)));
+        }
+        measure(&format!("the same, turned, n = {n}"), &scene, Vector::zeros());
+    }
+    for levels in 0..=3 {
+        let mut scene = ball::<4>(Vector::zeros(), 1.0, levels);
+        scene.extend(ball::<4>(Vector::from([1.5, 0.3, 0.1, 0.2]), 0.6, levels));
+        measure(&format!("two balls, level {levels}"), &scene, Vector::zeros());
+    }
+    for levels in 0..=5 {
+        let mut scene = ball::<3>(Vector::zeros(), 1.0, levels);
+        scene.extend(ball::<3>(Vector::from([1.5, 0.3, 0.1]), 0.6, levels));
+        measure(&format!("3D: two balls, level {levels}"), &scene, Vector::zeros());
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for count in [10, 30, 100, 300] {
+        measure(&format!("soup of {count}"), &soup::<4>(&mut rng, count, 0.3), Vector::zeros());
+    }
 }

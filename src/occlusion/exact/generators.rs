@@ -24,10 +24,10 @@ pub(super) struct Signed {
 }
 
 impl Signed {
-    /// The rounded value where its bound lets the sign be trusted, else the exact one.
+    /// A rounded value, if its bound lets the sign be trusted. A bound of zero means that all terms are zero.
     #[inline]
-    pub fn new(value: f64, bound: f64, exact: impl FnOnce() -> Expansion) -> Self {
-        if value.abs() > bound { Self { value, bound } } else { Self::of(&exact()) }
+    pub fn new(value: f64, bound: f64) -> Option<Self> {
+        (value.abs() > bound || bound == 0.0).then_some(Self { value, bound })
     }
 
     pub fn of(exact: &Expansion) -> Self {
@@ -71,7 +71,7 @@ impl<const D: usize> Generators<D> {
         self.columns.push(column);
         self.vectors.push(vector);
         let id = self.columns.len() as u32 - 1;
-        let height = Signed::new(value, bound, || self.exact_height(id));
+        let height = Signed::new(value, bound).unwrap_or_else(|| Signed::of(&self.exact_height(id)));
         self.heights.push(height);
     }
 

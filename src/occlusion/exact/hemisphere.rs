@@ -5,6 +5,7 @@ use super::exposed::{Counter, Spent, exposed};
 use super::generators::{Generators, INVERTED_NORMAL, Signed, direction};
 use super::plane::Plane;
 use super::polygon::{Hole, Region};
+use super::span::Span;
 use super::trace::{SimplicialCone, Trace, facet_above_horizon, trace};
 use crate::geometry::{Vector, widen};
 
@@ -130,7 +131,7 @@ impl<const D: usize> Hemisphere<D> {
         }
         // The first generator's side of the facet that the others span is the sign of all their determinant.
         let opposite: [u32; D] = std::array::from_fn(|i| if i + 1 < D { cone[i + 1] } else { u32::MAX });
-        let orientation = Plane::side_of_span(&self.generators, &opposite, cone[0]).sign();
+        let orientation = Span::new(&self.generators, opposite).side(&self.generators, cone[0]).sign();
         if orientation != 0 {
             self.cones.push(SimplicialCone { generators: cone, orientation });
         }
@@ -147,8 +148,7 @@ impl<const D: usize> Hemisphere<D> {
     }
 
     fn sum(&self, counter: &mut Counter) -> Result<f64, Spent> {
-        let normal = direction(&widen(&self.normal));
-        let horizon = Plane::horizon(normal);
+        let horizon = Plane::horizon(&widen(&self.normal));
         let units: Vec<_> = (0..self.generators.len() as u32).map(|id| direction(self.generators.vector(id))).collect();
         let bounds = |ids: &[u32]| {
             let mut corners = [units[0]; D];
@@ -164,7 +164,7 @@ impl<const D: usize> Hemisphere<D> {
         let mut sides = Sides::new(self.generators.len());
         for facet in self.open_facets() {
             let span = &facet.span[..D - 1];
-            let plane = Plane::of_facet(&self.generators, facet.span);
+            let plane = Plane::of_facet(&self.generators, Span::new(&self.generators, facet.span));
             let region = Region::<D>::new(facet_above_horizon(&plane, &horizon, &self.generators, span));
             tree.meeting(&bounds(span), &mut near);
             sides.forget();
@@ -181,7 +181,7 @@ impl<const D: usize> Hemisphere<D> {
                 holes.extend(hole.and_then(Hole::new));
             }
             let outwards = -f64::from(facet.side) * plane.unit_normal();
-            sum += outwards.dot(&normal) * exposed(region, &mut holes, counter)?;
+            sum += outwards.dot(horizon.unit_normal()) * exposed(region, &mut holes, counter)?;
         }
         let sphere = if D == 3 { 2.0 } else { 4.0 } * std::f64::consts::PI;
         Ok(sum / sphere)

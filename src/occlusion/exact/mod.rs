@@ -40,6 +40,8 @@ mod generators;
 mod hemisphere;
 mod plane;
 mod polygon;
+mod precise;
+mod span;
 mod trace;
 
 pub use hemisphere::{Budget, Hemisphere, OverBudget, visible_fraction};
