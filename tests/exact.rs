@@ -332,11 +332,11 @@ mod checks {
     /// have planes that all but coincide; points close to walls, edges and corners see them nearly from within.
     pub fn complementary_parts_of_an_enclosure<const D: usize>() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let mut worst = 0.0f64;
-        for round in 0..60 {
+        let (mut worst, mut count, mut skipped) = (0.0f64, 0, 0);
+        for round in 0..96 {
             let mut body = box_surface::<D>([-1.0; D], [1.0; D], 1 + round % 2);
             let (turn, scale, shift) =
-                ([false, true][round / 2 % 2], [1.0, 1e-6, 1e5][round / 4 % 3], [0.0, 100.0][round / 12 % 2]);
+                ([false, true][round / 8 % 2], [1.0, 1e-6, 1e5][round / 16 % 3], [0.0, 100.0][round / 48 % 2]);
             let angle = rng.random::<f64>();
             let place = |v: &Vector64<D>| {
                 let mut v = *v;
@@ -352,15 +352,20 @@ mod checks {
             for close in 0..=D {
                 let p = Vector64::<D>::from_fn(|i, _| {
                     if i < close {
-                        1.0 - [0.1, 1e-4, 1e-6][round % 3] * (1.0 + rng.random::<f64>())
+                        1.0 - [0.1, 1e-4, 1e-6, 1.2e-7][round / 2 % 4] * (1.0 + rng.random::<f64>())
                     } else {
                         rng.random::<f64>() - 0.5
                     }
                 });
-                if shift > 0.0 && close > 0 && round % 3 == 2 {
-                    continue; // Within an ulp of the wall.
-                }
                 let p = place(&p);
+                let middle = place(&Vector64::zeros());
+                // Rounding may put p outside, or a wall's simplices behind each other as seen from so close.
+                let orientation = |from, simplex| Cone::of_simplex(from, simplex).orientation();
+                if body.iter().any(|simplex| orientation(&p, simplex) != orientation(&middle, simplex)) {
+                    skipped += 1;
+                    continue;
+                }
+                count += 1;
                 let n = random_vector::<D>(&mut rng);
                 let (mut part, mut rest) = (Vec::new(), Vec::new());
                 for simplex in &body {
@@ -368,12 +373,10 @@ mod checks {
                 }
                 let (a, b) = (value(&p, &n, &part), value(&p, &n, &rest));
                 worst = worst.max((a + b - 1.0).abs());
-                if (a + b - 1.0).abs() > 1e-12 {
-                    println!("{round} {close} {a} {b} {:e}", a + b - 1.0);
-                }
             }
         }
-        println!("largest error of complements: {worst:e}");
+        println!("largest error of complements: {worst:e}, {count} points, {skipped} not seeing all of the inside");
+        assert!(count > 3 * skipped);
         assert!(worst < 1e-12);
     }
 

@@ -6,6 +6,7 @@
 
 use std::collections::HashMap;
 
+use super::precise::{PAIR_ROUNDING, Pair, dot_pairs, pairs};
 use crate::geometry::{Column, Expansion, Vector, Vector64, widen};
 
 /// The number of the generator -n.
@@ -114,30 +115,19 @@ impl<const D: usize> Generators<D> {
         })
     }
 
-    /// The direction of the sum of two generators with these weights, which are at least zero. Where the two are
-    /// nearly opposite, so that digits cancel, the sum is taken over the exact weights and is exact itself.
-    pub fn combine(
-        &self,
-        (a, weight_a): (u32, f64),
-        (b, weight_b): (u32, f64),
-        exact_weights: impl FnOnce() -> [Expansion; 2],
-    ) -> Vector64<D> {
-        let (u, v) = (self.vector(a) * weight_a, self.vector(b) * weight_b);
-        let sum = u + v;
-        if sum.norm_squared() > CANCELLED * (u.norm_squared() + v.norm_squared()) {
-            return direction(&sum);
+    /// The height above the horizon with all digits of a pair.
+    #[cold]
+    pub fn height_pair(&self, id: u32) -> Pair {
+        let normal = pairs(&Column::vector(self.normal));
+        let value = dot_pairs(&normal, &pairs(&self.column(id)));
+        let (_, bound) = dot(&widen(&self.normal), self.vector(id));
+        if value.high.abs() * f64::EPSILON > bound / ROUNDING * PAIR_ROUNDING {
+            value
+        } else {
+            Pair::of(&self.exact_height(id))
         }
-        let [weight_a, weight_b] = exact_weights();
-        let (a, b) = (self.column(a), self.column(b));
-        let entry = |c: &Column<D>, r: usize| Expansion::difference(f64::from(c.head[r]), f64::from(c.tail[r]));
-        direction(&Vector64::from_fn(|r, _| {
-            entry(&a, r).multiply(&weight_a).add(&entry(&b, r).multiply(&weight_b)).estimate()
-        }))
     }
 }
-
-/// The square of what must be left of a sum of generators, relative to its terms, or it is computed exactly.
-const CANCELLED: f64 = 1e-4;
 
 /// The unit vector along `v`, safe from underflow and overflow.
 #[inline]

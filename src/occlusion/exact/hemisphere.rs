@@ -74,6 +74,7 @@ pub struct Hemisphere<const D: usize> {
 }
 
 /// A facet of a cone that nothing covers from the other side by being the same facet.
+#[derive(Clone, Copy)]
 struct OpenFacet<const D: usize> {
     span: [u32; D],
     /// On which side of its plane the cone is.
@@ -165,7 +166,8 @@ impl<const D: usize> Hemisphere<D> {
         for facet in self.open_facets() {
             let span = &facet.span[..D - 1];
             let plane = Plane::of_facet(&self.generators, Span::new(&self.generators, facet.span));
-            let region = Region::<D>::new(facet_above_horizon(&plane, &horizon, &self.generators, span));
+            let corners = facet_above_horizon(&plane, &horizon, &self.generators, span);
+            let region = Region::<D>::new(corners);
             tree.meeting(&bounds(span), &mut near);
             sides.forget();
             let mut holes = Vec::with_capacity(near.len());
@@ -220,7 +222,7 @@ impl<const D: usize> Hemisphere<D> {
         for same in facets.chunk_by(|a, b| a.span == b.span) {
             let first = &same[0];
             if same.iter().all(|facet| facet.side == first.side) {
-                open.push(OpenFacet { span: first.span, side: first.side, cone: first.cone });
+                open.push(*first);
             }
         }
         open

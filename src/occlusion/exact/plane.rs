@@ -8,14 +8,18 @@
 //! Householder reflection that takes e_D to the plane's normal.
 
 use super::generators::{Generators, Signed, direction};
+use super::precise::{Pair, pairs};
 use super::span::Span;
-use crate::geometry::{Expansion, Vector64};
+use crate::geometry::Vector64;
 
 /// A direction within a plane: D - 1 coordinates, and zero for what D = 3 has no use for.
 pub(super) type Flat = Vector64<3>;
 
 /// How large the error of a value may be, relative to the values whose ratio is taken, before it is refined.
 const RATIO_ERROR: f64 = 1e-12;
+
+/// The square of what must be left of a sum of generators, relative to its terms, or it is taken of pairs.
+const CANCELLED: f64 = 1e-3;
 
 /// A hyperplane through p.
 #[derive(Clone, Debug)]
@@ -58,28 +62,6 @@ impl<const D: usize> Plane<D> {
         }
     }
 
-    /// How far a generator is from the plane, within `error` or with all digits.
-    fn distance(&self, generators: &Generators<D>, id: u32, side: Signed, error: f64) -> f64 {
-        let mut side = side;
-        if side.bound > error {
-            side = match &self.span {
-                None => Signed::of(&generators.exact_height(id)),
-                Some(span) => span.refined(generators, id),
-            };
-        }
-        if side.bound > error {
-            side = Signed::of(&self.exact(generators, id));
-        }
-        side.value.abs()
-    }
-
-    fn exact(&self, generators: &Generators<D>, id: u32) -> Expansion {
-        match &self.span {
-            None => generators.exact_height(id),
-            Some(span) => span.exact(generators, id),
-        }
-    }
-
     /// Where the edge between two generators on opposite sides crosses the plane, as a unit vector.
     pub fn crossing(
         &self,
@@ -87,17 +69,49 @@ impl<const D: usize> Plane<D> {
         (a, side_a): (u32, Signed),
         (b, side_b): (u32, Signed),
     ) -> Vector64<D> {
-        let error = RATIO_ERROR * (side_a.value.abs() + side_b.value.abs());
-        let distance_a = self.distance(generators, a, side_a, error);
-        let distance_b = self.distance(generators, b, side_b, error);
-        let sum = distance_a + distance_b;
-        let magnitude = |id| {
-            let exact = self.exact(generators, id);
-            if exact.sign() < 0 { exact.negate() } else { exact }
-        };
-        let exact_weights = || [magnitude(b), magnitude(a)];
-        generators.combine((a, distance_b / sum), (b, distance_a / sum), exact_weights)
+        let (distance_a, distance_b) = (side_a.value.abs(), side_b.value.abs());
+        let total = distance_a + distance_b;
+        if side_a.bound + side_b.bound <= RATIO_ERROR * total {
+            let (u, v) = (generators.vector(a) * (distance_b / total), generators.vector(b) * (distance_a / total));
+            let sum = u + v;
+            // Of nearly opposite generators little is left.
+            if sum.norm_squared() > CANCELLED * (u.norm_squared() + v.norm_squared()) {
+                return direction(&sum);
+            }
+        }
+        direction(&rounded(&self.crossing_pairs(generators, a, b)))
     }
+
+    /// The same with all digits of pairs, and of any length.
+    #[cold]
+    fn crossing_pairs(&self, generators: &Generators<D>, a: u32, b: u32) -> [Pair; D] {
+        let distance = |id| {
+            let side = match &self.span {
+                None => generators.height_pair(id),
+                Some(span) => span.side_pair(generators, id),
+            };
+            side.abs()
+        };
+        let (weight_a, weight_b) = (distance(b), distance(a));
+        let (a, b) = (pairs(&generators.column(a)), pairs(&generators.column(b)));
+        std::array::from_fn(|r| a[r].times(weight_a).plus(b[r].times(weight_b)))
+    }
+
+    /// The middle of the edge between two corners that are nearly opposite, as a unit vector. Each corner is given by
+    /// the generators whose edge crosses the plane there, or by one generator twice.
+    #[cold]
+    pub fn middle(&self, generators: &Generators<D>, corners: [(u32, u32); 2]) -> Vector64<D> {
+        let [a, b] = corners.map(|(a, b)| {
+            let corner = if a == b { pairs(&generators.column(a)) } else { self.crossing_pairs(generators, a, b) };
+            let scale = Pair { high: 1.0 / rounded(&corner).norm(), low: 0.0 };
+            corner.map(|x| x.times(scale))
+        });
+        direction(&rounded(&std::array::from_fn(|r| a[r].plus(b[r]))))
+    }
+}
+
+fn rounded<const D: usize>(v: &[Pair; D]) -> Vector64<D> {
+    Vector64::from_fn(|r, _| v[r].high)
 }
 
 /// An orthonormal basis of a hyperplane through p.

@@ -15,6 +15,12 @@ pub(super) const ON_LINE: f64 = 2e-15;
 /// The cosine below which the angle between neighbouring corners counts as long.
 const LONG: f64 = -0.25;
 
+/// Whether the edge between two corners is so long that a corner is to be put on it.
+#[inline]
+pub(super) fn is_long(a: &Flat, b: &Flat) -> bool {
+    a.dot(b) < LONG
+}
+
 /// How a region lies to another one that is to be taken out of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Relation {
@@ -65,7 +71,7 @@ impl<const D: usize> Region<D> {
     }
 
     fn shorten_edges(&mut self) {
-        if self.is_flat() || self.edges().all(|(a, b)| a.dot(&b) >= LONG) {
+        if self.is_flat() || self.edges().all(|(a, b)| !is_long(&a, &b)) {
             return;
         }
         let edges: Vec<_> = self.edges().collect();
@@ -73,7 +79,7 @@ impl<const D: usize> Region<D> {
         self.corners.clear();
         for (a, b) in edges {
             self.corners.push(a);
-            if a.dot(&b) < LONG {
+            if is_long(&a, &b) {
                 self.corners.push((a + b).normalize());
             }
         }
@@ -149,8 +155,7 @@ impl<const D: usize> Region<D> {
     /// A region that was cut off: the edge along the cut may be long.
     fn cut(corners: Vec<Flat>, inward: &Flat) -> Self {
         let region = Self { corners };
-        let long = |(a, b): (Flat, Flat)| a.dot(&b) < LONG;
-        let Some(at) = region.edges().position(long) else { return region };
+        let Some(at) = region.edges().position(|(a, b)| is_long(&a, &b)) else { return region };
         let mut corners = region.corners;
         let (a, b) = (corners[at], corners[(at + 1) % corners.len()]);
         corners.insert(at + 1, inward.cross(&(a - b)).normalize());

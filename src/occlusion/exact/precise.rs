@@ -6,7 +6,7 @@
 //! power of two, it is computed in 128-bit integers. Only what is left goes to expansions, which are some hundred
 //! times slower.
 
-use crate::geometry::{Column, Vector64};
+use crate::geometry::{Column, Expansion, Vector64};
 
 /// Rounding of a sum of products of D pairs' numbers, relative to the product of the columns' 1-norms. Each operation
 /// rounds by less than 2^-103 of its result; a D x D determinant has fewer than 2^6 of them on any path of additions.
@@ -47,8 +47,19 @@ impl Pair {
         two_sum(f64::from(a), -f64::from(b))
     }
 
+    /// A sum of two doubles of which the second is the smaller.
+    pub fn of(exact: &Expansion) -> Self {
+        let high = exact.estimate();
+        Self { high, low: exact.add(&Expansion::difference(-high, 0.0)).estimate() }
+    }
+
+    /// The absolute value.
+    pub fn abs(self) -> Self {
+        if self.high < 0.0 { Self { high: -self.high, low: -self.low } } else { self }
+    }
+
     #[inline]
-    fn plus(self, other: Self) -> Self {
+    pub fn plus(self, other: Self) -> Self {
         let (high, low) = (two_sum(self.high, other.high), two_sum(self.low, other.low));
         let sum = two_sum(high.high, high.low + low.high);
         two_sum(sum.high, sum.low + low.low)
@@ -60,7 +71,7 @@ impl Pair {
     }
 
     #[inline]
-    fn times(self, other: Self) -> Self {
+    pub fn times(self, other: Self) -> Self {
         let product = two_product(self.high, other.high);
         two_sum(product.high, product.low + (self.high * other.low + self.low * other.high))
     }

@@ -73,11 +73,8 @@ impl<const D: usize> Span<D> {
 
     /// The same with all digits, or nearly.
     #[cold]
-    pub fn refined(&self, generators: &Generators<D>, id: u32) -> Signed {
-        let relative = relative_to(generators, self.base, id);
-        let vector = widen(&relative.head) - widen(&relative.tail);
-        let bound = PAIR_ROUNDING * self.size * norm1(&vector);
-        let value = dot_pairs(self.pairs(generators), &pairs(&relative));
+    fn refined(&self, generators: &Generators<D>, id: u32) -> Signed {
+        let (value, bound) = self.rounded_pair(generators, id);
         // A few digits are asked for, not only the sign.
         if value.high.abs() > 1e4 * bound {
             return Signed { value: value.high, bound: bound + f64::EPSILON * value.high.abs() };
@@ -88,8 +85,21 @@ impl<const D: usize> Span<D> {
         }
     }
 
-    /// The same as an expansion.
-    pub fn exact(&self, generators: &Generators<D>, id: u32) -> Expansion {
+    /// The same with all digits of a pair.
+    #[cold]
+    pub fn side_pair(&self, generators: &Generators<D>, id: u32) -> Pair {
+        let (value, bound) = self.rounded_pair(generators, id);
+        if value.high.abs() * f64::EPSILON > bound { value } else { Pair::of(&self.exact(generators, id)) }
+    }
+
+    fn rounded_pair(&self, generators: &Generators<D>, id: u32) -> (Pair, f64) {
+        let relative = relative_to(generators, self.base, id);
+        let vector = widen(&relative.head) - widen(&relative.tail);
+        let bound = PAIR_ROUNDING * self.size * norm1(&vector);
+        (dot_pairs(self.pairs(generators), &pairs(&relative)), bound)
+    }
+
+    fn exact(&self, generators: &Generators<D>, id: u32) -> Expansion {
         exact_determinant(&self.columns(generators, generators.column(id)))
     }
 

@@ -6,6 +6,7 @@
 
 use super::generators::{Generators, Signed};
 use super::plane::{Flat, Plane};
+use super::polygon::is_long;
 
 /// A simplicial cone with its apex at p.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,36 +73,60 @@ pub(super) fn trace<const D: usize>(
     let flat = |place: usize| plane.chart().flatten(generators.vector(cone.generators[place]));
     let numbered = |place: usize| (cone.generators[place], sides[place]);
     let crossing = |a, b| plane.chart().flatten(&plane.crossing(generators, numbered(a), numbered(b)));
-    // The generators in `order` turn as (x, corners...) do, x being the first of them; and x is before the plane's
-    // normal or behind it.
-    let mut corners: Vec<Flat> = within.iter().map(|&i| flat(i)).collect();
+    // Each corner with the generators whose edge it is on.
+    let number = |place: usize| cone.generators[place];
+    let mut corners: Vec<Corner> = within.iter().map(|&i| (flat(i), number(i), number(i))).collect();
+    let pairs: &[(usize, usize)] = match (above, below) {
+        (&[a, c], &[b, d]) => &[(a, b), (a, d), (c, d), (c, b)],
+        (&[a], _) => &std::array::from_fn::<_, D, _>(|i| (a, *below.get(i).unwrap_or(&a)))[..n_below],
+        (_, &[b]) => &std::array::from_fn::<_, D, _>(|i| (*above.get(i).unwrap_or(&b), b))[..n_above],
+        _ => &[],
+    };
+    corners.extend(pairs.iter().map(|&(a, b)| (crossing(a, b), number(a), number(b))));
+    // With x the first of `order`, on side s, (x, corners...) turn s times as the generators in this order do.
     let mut order = Vec::with_capacity(D);
-    match (n_above, n_below) {
-        (2, 2) => {
-            let (a, b) = (above, below);
-            corners.extend([(a[0], b[0]), (a[0], b[1]), (a[1], b[1]), (a[1], b[0])].map(|(a, b)| crossing(a, b)));
-            order.extend([a[0], b[0], b[1], a[1]]);
-        }
-        (1, _) => {
-            corners.extend(below.iter().map(|&b| crossing(above[0], b)));
-            order.push(above[0]);
-            order.extend(within.iter().chain(below));
-        }
-        _ => {
-            corners.extend(above.iter().map(|&a| crossing(a, below[0])));
-            order.push(below[0]);
-            order.extend(within.iter().chain(above));
-        }
+    match (above, below) {
+        (&[a, c], &[b, d]) => order.extend([a, b, d, c]),
+        (&[a], _) => order.extend([a].iter().chain(within).chain(below)),
+        _ => order.extend(below.iter().chain(within).chain(above)),
     }
-    let first_side = sides[order[0]].sign();
-    if cone.sign_of_order(&order) * first_side < 0 {
+    if cone.sign_of_order(&order) * sides[order[0]].sign() < 0 {
         corners.reverse();
     }
+    let corners = halve_long_edges(plane, plane, generators, &corners);
     match (n_above, n_below) {
         (_, 0) => Trace::Above(corners),
         (0, _) => Trace::Below(corners),
         _ => Trace::Across(corners),
     }
+}
+
+/// A corner with the two generators on whose edge it is, or one generator twice.
+type Corner = (Flat, u32, u32);
+
+/// Puts a corner on the middle of each long edge of a region. Where its ends are nearly opposite, their sum keeps
+/// digits only as a sum of pairs, starting from the generators; `cutting` is the plane that cuts their edges.
+fn halve_long_edges<const D: usize>(
+    plane: &Plane<D>,
+    cutting: &Plane<D>,
+    generators: &Generators<D>,
+    corners: &[Corner],
+) -> Vec<Flat> {
+    let mut halved = Vec::with_capacity(corners.len() + 1);
+    for (i, a) in corners.iter().enumerate() {
+        halved.push(a.0);
+        let next = (i + 1) % corners.len();
+        let b = corners[next];
+        if (D > 3 || next > 0) && is_long(&a.0, &b.0) {
+            let sum = a.0 + b.0;
+            halved.push(if sum.norm_squared() > 1e-2 {
+                sum.normalize()
+            } else {
+                plane.chart().flatten(&cutting.middle(generators, [(a.1, a.2), (b.1, b.2)]))
+            });
+        }
+    }
+    halved
 }
 
 /// The corners of the part of a facet that lies above the horizon, anticlockwise; fewer than D - 1 if there is none.
@@ -115,14 +140,15 @@ pub(super) fn facet_above_horizon<const D: usize>(
     for (i, &a) in facet.iter().enumerate() {
         let side = generators.height(a);
         if side.sign() >= 0 {
-            corners.push(plane.chart().flatten(generators.vector(a)));
+            corners.push((plane.chart().flatten(generators.vector(a)), a, a));
         }
         let next = (i + 1) % facet.len();
         let b = facet[next];
         let side_b = generators.height(b);
         if (D > 3 || next > 0) && side.sign() * side_b.sign() < 0 {
-            corners.push(plane.chart().flatten(&horizon.crossing(generators, (a, side), (b, side_b))));
+            let crossing = horizon.crossing(generators, (a, side), (b, side_b));
+            corners.push((plane.chart().flatten(&crossing), a, b));
         }
     }
-    corners
+    halve_long_edges(plane, horizon, generators, &corners)
 }
