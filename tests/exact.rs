@@ -1,6 +1,6 @@
 //! Exact ambient occlusion against values known by other means, in 3D and 4D.
 
-use ao4d::geometry::{Column, Cone, Vector, Vector64, narrow, widen};
+use ao4d::geometry::{Column, Cone, Vector, Vector64, narrow, normal_of, widen};
 use ao4d::occlusion::exact::{Budget, Hemisphere, visible_fraction};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
@@ -184,6 +184,7 @@ macro_rules! in_3d_and_4d {
 in_3d_and_4d! {
     nothing_occludes_nothing orthant half_space fold enclosed_in_a_box enclosed_in_a_ball convex_body_alone
     random_soup_by_rays subdivided_occluder complementary_parts_of_an_enclosure copies_moved_by_an_ulp
+    ball_above_a_horizon circular_cone symmetric_scenes slivers tiny_distances over_budget
 }
 
 mod checks {
@@ -413,6 +414,159 @@ mod checks {
         println!("largest change by copies an ulp away: {worst:e}");
         assert!(worst < 1e-6);
     }
+
+    /// Distance of the planes of a tessellated ball's simplices from its centre, at least.
+    fn inradius<const D: usize>(simplices: &[[Vector<D>; D]], centre: Vector<D>) -> f64 {
+        let distance = |simplex: &[Vector<D>; D]| {
+            let vertices = simplex.each_ref().map(widen);
+            normal_of(&vertices).normalize().dot(&(vertices[0] - widen(&centre))).abs()
+        };
+        simplices.iter().map(distance).fold(f64::INFINITY, f64::min)
+    }
+
+    /// A ball of radius r at distance d in direction u takes (r / d)^(D-1) (u . n).
+    pub fn ball_above_a_horizon<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        for (levels, width) in [(1, 0.2), (2, 0.08), (3, 0.025)] {
+            for _ in 0..3 {
+                let p = random_vector::<D>(&mut rng);
+                let n = random_vector::<D>(&mut rng).normalize();
+                let u = (random_vector::<D>(&mut rng) * 0.3 + n).normalize();
+                let body = ball(p + u * 1.5, 0.7, levels);
+                let taken = |radius: f64| (radius / 1.5).powi(D as i32 - 1) * widen(&u).dot(&widen(&n));
+                let (low, high) = (taken(inradius(&body, p + u * 1.5)), taken(0.7));
+                let a = 1.0 - value(&p, &n, &body);
+                assert!(low - 1e-6 < a && a < high + 1e-6, "{low} < {a} < {high}");
+                assert!(high - low < width, "the bracket is narrow: {low} {high}");
+            }
+        }
+    }
+
+    /// A circular cone of half-angle a around n takes sin^(D-1) a.
+    pub fn circular_cone<const D: usize>() {
+        // The directions of the horizon, as simplices of D - 1 points on the unit sphere, and their inradius.
+        let (rim, inradius): (Vec<Vec<Vector<D>>>, f64) = if D == 3 {
+            let point = |k: usize| {
+                let angle = (k % 64) as f64 * std::f64::consts::TAU / 64.0;
+                Vector::<D>::from_fn(|r, _| [angle.cos(), angle.sin(), 0.0][r] as f32)
+            };
+            ((0..64).map(|k| vec![point(k), point(k + 1)]).collect(), (std::f64::consts::PI / 64.0).cos())
+        } else {
+            let sphere = ball::<3>(Vector::zeros(), 1.0, 3);
+            let lift = |v: &Vector<3>| Vector::<D>::from_fn(|r, _| if r < 3 { v[r] } else { 0.0 });
+            (sphere.iter().map(|s| s.iter().map(lift).collect()).collect(), inradius(&sphere, Vector::zeros()))
+        };
+        let n = axis::<D>(D - 1);
+        for half_angle in [0.1f64, 0.5, 1.2] {
+            let cone: Simplices<D> = rim
+                .iter()
+                .map(|rim| {
+                    std::array::from_fn(|i| {
+                        if i == 0 { n } else { rim[i - 1] * half_angle.sin() as f32 + n * half_angle.cos() as f32 }
+                    })
+                })
+                .collect();
+            let taken = 1.0 - value(&Vector::zeros(), &n, &cone);
+            let power = |angle: f64| angle.sin().powi(D as i32 - 1);
+            let (low, high) = (power((half_angle.tan() * inradius).atan()), power(half_angle));
+            assert!(low - 1e-7 < taken && taken < high + 1e-7, "{low} < {taken} < {high}");
+        }
+    }
+
+    /// Exchanging and mirroring axes changes no value; nor does the order, the scale or a turn by much.
+    pub fn symmetric_scenes<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let mut worst = 0.0f64;
+        for _ in 0..10 {
+            let mut scene = soup::<D>(&mut rng, 15, 0.6);
+            scene.extend(box_surface::<D>([0.5; D], std::array::from_fn(|i| 1.0 + i as f32 / 4.0), 2));
+            scene.extend(ball::<D>(-Vector::<D>::from_element(0.6), 0.5, 1));
+            let (p, n) = (Vector::zeros(), random_vector::<D>(&mut rng));
+            let a = value(&p, &n, &scene);
+            for round in 0..D {
+                let place = |v: &Vector<D>| {
+                    Vector::<D>::from_fn(|r, _| v[(r + round) % D] * if round >> (r % 2) & 1 == 1 { -2.0 } else { 2.0 })
+                };
+                let mut moved: Simplices<D> = scene.iter().map(|s| s.each_ref().map(place)).collect();
+                moved.reverse();
+                moved.iter_mut().for_each(|s| s.rotate_left(round % D));
+                worst = worst.max((value(&p, &place(&n), &moved) - a).abs());
+            }
+            let turn = |v: &Vector<D>| narrow(&turned(&widen(v), 0.4));
+            let moved: Simplices<D> = scene.iter().map(|s| s.each_ref().map(turn)).collect();
+            assert!((value(&p, &turn(&n), &moved) - a).abs() < 1e-5);
+        }
+        println!("largest change by symmetries: {worst:e}");
+        assert!(worst < 1e-12);
+        // A cross-polytope's corners see the same.
+        let body = ball::<D>(Vector::zeros(), 1.0, 0);
+        for shell in [0.5f32, 2.0] {
+            let mut scene = body.clone();
+            scene
+                .extend(box_surface::<D>([-shell; D], [shell; D], 2).iter().filter(|s| s[0][0].abs() != s[1][0].abs()));
+            let values: Vec<f64> = (1..D).map(|i| value(&axis(i), &axis(i), &scene)).collect();
+            assert!(values.iter().all(|v| (v - values[0]).abs() < 1e-14), "{values:?}");
+        }
+    }
+
+    /// Flat and needle-like simplices, some of them all but in a plane with p.
+    pub fn slivers<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(10);
+        let mut worst = 0.0f64;
+        for round in 0..40 {
+            let flatness = [1e-3f32, 1e-6, 1e-9, 0.0][round % 4];
+            let mut scene = soup::<D>(&mut rng, 20, 1.0);
+            for (k, simplex) in scene.iter_mut().enumerate() {
+                match k % 3 {
+                    // The last vertex nearly on an edge, or on the ray through another, or the first axis squeezed.
+                    0 => simplex[D - 1] = (simplex[0] + simplex[1]) * 0.5 + random_vector(&mut rng) * flatness,
+                    1 => simplex[D - 1] = simplex[0] * 2.0 + random_vector(&mut rng) * flatness,
+                    _ => simplex.iter_mut().for_each(|v| v[0] = 0.3 * v[1] + v[0] * flatness),
+                }
+            }
+            let (p, n) = (Vector::zeros(), random_vector::<D>(&mut rng));
+            let a = value(&p, &n, &scene);
+            let (mean, error) = monte_carlo(&mut rng, &p, &n, &scene, 5000);
+            assert!((a - mean).abs() < 5.0 * error, "{a} {mean} {error}");
+            let mut reversed = scene.clone();
+            reversed.reverse();
+            reversed.extend(&scene);
+            worst = worst.max((value(&p, &n, &reversed) - a).abs());
+        }
+        println!("largest change by order among slivers: {worst:e}");
+        assert!(worst < 1e-12);
+    }
+
+    /// A point at all but no distance from a corner, an edge, ... of its enclosure: cones that are all but half-spaces.
+    pub fn tiny_distances<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let mut worst = 0.0f64;
+        for round in 0..60 {
+            let distance = [1e-3f32, 1e-10, 1e-20, 1e-30][round % 4];
+            let near = round / 4 % (D + 1);
+            let body = box_surface::<D>([-1.0; D], [0.0; D], 1 + round % 2);
+            let p = Vector::<D>::from_fn(|i, _| if i < near { -distance } else { -0.9 * rng.random::<f32>() });
+            let n = random_vector::<D>(&mut rng);
+            let whole = value(&p, &n, &body);
+            worst = worst.max(whole.abs());
+            let (part, rest): (Simplices<D>, Simplices<D>) = body.iter().partition(|_| rng.random());
+            let error = (value(&p, &n, &part) + value(&p, &n, &rest) - 1.0).abs();
+            worst = worst.max(error);
+        }
+        println!("largest error at tiny distances: {worst:e}");
+        assert!(worst < 1e-12);
+    }
+
+    pub fn over_budget<const D: usize>() {
+        let mut rng = ChaCha8Rng::seed_from_u64(12);
+        let scene = soup::<D>(&mut rng, 50, 1.0);
+        let p = Vector::zeros();
+        let error = visible_fraction(&p, &axis(0), [], scene, Budget { cones: 20 }).unwrap().unwrap_err();
+        let message = error.to_string();
+        for part in ["exact occlusion", "(0, 0, 0", "more than 20 cones", "method: sobol"] {
+            assert!(message.contains(part), "{message}");
+        }
+    }
 }
 
 #[test]
@@ -475,4 +629,17 @@ fn time_per_vertex() {
     for count in [10, 30, 100, 300] {
         measure(&format!("soup of {count}"), &soup::<4>(&mut rng, count, 0.3), Vector::zeros());
     }
+}
+
+/// The same scenes against many rays.
+#[test]
+#[ignore = "eight million rays"]
+fn one_scene_by_many_rays() {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let simplices = soup::<4>(&mut rng, 12, 0.5);
+    let (p, n) = (Vector::zeros(), Vector::from_element(1.0));
+    let exact = value(&p, &n, &simplices);
+    let (mean, error) = monte_carlo(&mut rng, &p, &n, &simplices, 8_000_000);
+    println!("{exact:.8} {mean:.8} +- {error:.8}");
+    assert!((exact - mean).abs() < 4.0 * error);
 }

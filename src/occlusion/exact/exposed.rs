@@ -46,6 +46,15 @@ pub(super) fn exposed<const D: usize>(
     let mut tasks: Vec<Task<D>> = vec![(region, (0..holes.len() as u32).collect(), usize::MAX)];
     while let Some((region, mut candidates, before)) = tasks.pop() {
         counter.count()?;
+        // The corners of half a sphere all lie on a line, and can't tell on which side of it they are meant to be.
+        if region.is_nearly_half()
+            && let Some(line) = region.bisector()
+            && let (Some(behind), Some(ahead)) = region.split(&line)
+        {
+            tasks.push((behind, candidates.clone(), before));
+            tasks.push((ahead, candidates, before));
+            continue;
+        }
         let mut covered = false;
         candidates.retain(|&candidate| {
             let relation = if covered { Relation::Apart } else { holes[candidate as usize].relation(&region) };

@@ -8,9 +8,9 @@
 //! Householder reflection that takes e_D to the plane's normal.
 
 use super::generators::{Generators, Signed, direction};
-use super::precise::{Pair, pairs};
+use super::precise::{Pair, norm1, pairs};
 use super::span::Span;
-use crate::geometry::Vector64;
+use crate::geometry::{Expansion, Vector64};
 
 /// A direction within a plane: D - 1 coordinates, and zero for what D = 3 has no use for.
 pub(super) type Flat = Vector64<3>;
@@ -20,6 +20,9 @@ const RATIO_ERROR: f64 = 1e-12;
 
 /// The square of what must be left of a sum of generators, relative to its terms, or it is taken of pairs.
 const CANCELLED: f64 = 1e-3;
+
+/// What must be left of a sum of pairs, relative to its terms: the pairs' 31 digits less these leave 15.
+const KEPT_PAIRS: f64 = 1e-15;
 
 /// A hyperplane through p.
 #[derive(Clone, Debug)]
@@ -79,12 +82,24 @@ impl<const D: usize> Plane<D> {
                 return direction(&sum);
             }
         }
-        direction(&rounded(&self.crossing_pairs(generators, a, b)))
+        self.refined_crossing(generators, a, b)
     }
 
-    /// The same with all digits of pairs, and of any length.
     #[cold]
-    fn crossing_pairs(&self, generators: &Generators<D>, a: u32, b: u32) -> [Pair; D] {
+    fn refined_crossing(&self, generators: &Generators<D>, a: u32, b: u32) -> Vector64<D> {
+        let (sum, kept) = self.crossing_pairs(generators, a, b);
+        if kept > KEPT_PAIRS {
+            direction(&rounded(&sum))
+        } else {
+            direction(&estimates(&self.exact_crossing(generators, a, b)))
+        }
+    }
+
+    /// The crossing, of any length, with all digits of pairs but those that cancelled, and how much these left.
+    fn crossing_pairs(&self, generators: &Generators<D>, a: u32, b: u32) -> ([Pair; D], f64) {
+        if a == b {
+            return (pairs(&generators.column(a)), 1.0);
+        }
         let distance = |id| {
             let side = match &self.span {
                 None => generators.height_pair(id),
@@ -93,25 +108,71 @@ impl<const D: usize> Plane<D> {
             side.abs()
         };
         let (weight_a, weight_b) = (distance(b), distance(a));
-        let (a, b) = (pairs(&generators.column(a)), pairs(&generators.column(b)));
-        std::array::from_fn(|r| a[r].times(weight_a).plus(b[r].times(weight_b)))
+        let u = pairs(&generators.column(a)).map(|x| x.times(weight_a));
+        let v = pairs(&generators.column(b)).map(|x| x.times(weight_b));
+        let sum: [Pair; D] = std::array::from_fn(|r| u[r].plus(v[r]));
+        let kept = norm1(&rounded(&sum)) / (norm1(&rounded(&u)) + norm1(&rounded(&v)));
+        (sum, kept)
     }
 
-    /// The middle of the edge between two corners that are nearly opposite, as a unit vector. Each corner is given by
-    /// the generators whose edge crosses the plane there, or by one generator twice.
-    #[cold]
-    pub fn middle(&self, generators: &Generators<D>, corners: [(u32, u32); 2]) -> Vector64<D> {
-        let [a, b] = corners.map(|(a, b)| {
-            let corner = if a == b { pairs(&generators.column(a)) } else { self.crossing_pairs(generators, a, b) };
-            let scale = Pair { high: 1.0 / rounded(&corner).norm(), low: 0.0 };
-            corner.map(|x| x.times(scale))
-        });
-        direction(&rounded(&std::array::from_fn(|r| a[r].plus(b[r]))))
+    fn exact_crossing(&self, generators: &Generators<D>, a: u32, b: u32) -> [Expansion; D] {
+        let entry = |id, r: usize| {
+            let column = generators.column(id);
+            Expansion::difference(f64::from(column.head[r]), f64::from(column.tail[r]))
+        };
+        if a == b {
+            return std::array::from_fn(|r| entry(a, r));
+        }
+        let distance = |id| {
+            magnitude(&match &self.span {
+                None => generators.exact_height(id),
+                Some(span) => span.exact(generators, id),
+            })
+        };
+        let (weight_a, weight_b) = (distance(b), distance(a));
+        std::array::from_fn(|r| entry(a, r).multiply(&weight_a).add(&entry(b, r).multiply(&weight_b)))
     }
+
+    /// The direction between two corners that are nearly opposite, at a right angle to the first. Each corner is given
+    /// by the generators whose edge crosses the plane there, or by one generator twice.
+    ///
+    /// It is found from a direction between them in which the largest coordinate of the first vanishes: the mean of two
+    /// unit vectors would be at the mercy of the rounding of their lengths.
+    #[cold]
+    pub fn between(&self, generators: &Generators<D>, corners: [(u32, u32); 2]) -> Vector64<D> {
+        let [(a, kept_a), (b, kept_b)] = corners.map(|(a, b)| self.crossing_pairs(generators, a, b));
+        let (u, v) = (rounded(&a), rounded(&b));
+        let largest = u.iamax();
+        let (weight_a, weight_b) = (b[largest].abs(), a[largest].abs());
+        let sum: [Pair; D] = std::array::from_fn(|r| a[r].times(weight_a).plus(b[r].times(weight_b)));
+        let sum = rounded(&sum);
+        if kept_a.min(kept_b) * norm1(&sum) > KEPT_PAIRS * norm1(&u) * norm1(&v) {
+            return across(&sum, &u);
+        }
+        let [a, b] = corners.map(|(a, b)| self.exact_crossing(generators, a, b));
+        let largest = estimates(&a).iamax();
+        let (weight_a, weight_b) = (magnitude(&b[largest]), magnitude(&a[largest]));
+        let sum = std::array::from_fn(|r| a[r].multiply(&weight_a).add(&b[r].multiply(&weight_b)));
+        across(&estimates(&sum), &estimates(&a))
+    }
+}
+
+/// The unit vector at a right angle to `b` in the plane of both, towards `a`.
+fn across<const D: usize>(a: &Vector64<D>, b: &Vector64<D>) -> Vector64<D> {
+    let (a, b) = (direction(a), direction(b));
+    direction(&(a - b * a.dot(&b)))
+}
+
+fn magnitude(exact: &Expansion) -> Expansion {
+    if exact.sign() < 0 { exact.negate() } else { exact.clone() }
 }
 
 fn rounded<const D: usize>(v: &[Pair; D]) -> Vector64<D> {
     Vector64::from_fn(|r, _| v[r].high)
+}
+
+fn estimates<const D: usize>(v: &[Expansion; D]) -> Vector64<D> {
+    Vector64::from_fn(|r, _| v[r].estimate())
 }
 
 /// An orthonormal basis of a hyperplane through p.

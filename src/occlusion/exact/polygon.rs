@@ -70,6 +70,11 @@ impl<const D: usize> Region<D> {
         self.corners.len() < D - 1
     }
 
+    /// Whether this is nearly half of all directions, in 4D.
+    pub fn is_nearly_half(&self) -> bool {
+        D > 3 && self.corners.len() > 3 && self.measure() > 1.5 * std::f64::consts::PI
+    }
+
     fn shorten_edges(&mut self) {
         if self.is_flat() || self.edges().all(|(a, b)| !is_long(&a, &b)) {
             return;
@@ -96,14 +101,27 @@ impl<const D: usize> Region<D> {
         if D == 3 {
             return self.edges().map(|(a, b)| a.cross(&b).norm().atan2(a.dot(&b))).sum();
         }
-        let a = self.corners[0];
-        self.corners[1..]
-            .windows(2)
-            .map(|pair| {
-                let (b, c) = (pair[0], pair[1]);
-                2.0 * a.dot(&b.cross(&c)).atan2(1.0 + a.dot(&b) + b.dot(&c) + c.dot(&a))
+        let a = self.fan_centre();
+        self.edges()
+            .map(|(b, c)| {
+                // The corners turn anticlockwise: below zero is rounding, and would turn half a sphere into minus it.
+                let volume = a.dot(&b.cross(&c));
+                let volume = if volume > 0.0 { volume } else { 0.0 };
+                2.0 * volume.atan2(1.0 + a.dot(&b) + b.dot(&c) + c.dot(&a))
             })
             .sum()
+    }
+
+    /// A point of the boundary that is not opposite to any corner, to fan triangles from: the first corner if it will
+    /// do, else the best of the corners and the middles of the edges.
+    fn fan_centre(&self) -> Flat {
+        let nearness = |centre: &Flat| self.corners.iter().map(|c| c.dot(centre)).fold(1.0, f64::min);
+        let first = self.corners[0];
+        if nearness(&first) > -0.9 {
+            return first;
+        }
+        let candidates = self.edges().flat_map(|(a, b)| [a, (a + b).normalize()]);
+        candidates.max_by(|a, b| nearness(a).total_cmp(&nearness(b))).unwrap_or(first)
     }
 
     /// Vectors towards the inside of each bounding line, not of unit length: `v . x >= 0` for all x of the region.

@@ -99,7 +99,9 @@ impl<const D: usize> Span<D> {
         (dot_pairs(self.pairs(generators), &pairs(&relative)), bound)
     }
 
-    fn exact(&self, generators: &Generators<D>, id: u32) -> Expansion {
+    /// The same as an expansion.
+    #[cold]
+    pub fn exact(&self, generators: &Generators<D>, id: u32) -> Expansion {
         exact_determinant(&self.columns(generators, generators.column(id)))
     }
 

@@ -104,8 +104,8 @@ pub(super) fn trace<const D: usize>(
 /// A corner with the two generators on whose edge it is, or one generator twice.
 type Corner = (Flat, u32, u32);
 
-/// Puts a corner on the middle of each long edge of a region. Where its ends are nearly opposite, their sum keeps
-/// digits only as a sum of pairs, starting from the generators; `cutting` is the plane that cuts their edges.
+/// Puts a corner on each long edge of a region. Where its ends are nearly opposite, their sum keeps digits only if it
+/// starts from the generators; `cutting` is the plane that cuts their edges.
 fn halve_long_edges<const D: usize>(
     plane: &Plane<D>,
     cutting: &Plane<D>,
@@ -122,7 +122,7 @@ fn halve_long_edges<const D: usize>(
             halved.push(if sum.norm_squared() > 1e-2 {
                 sum.normalize()
             } else {
-                plane.chart().flatten(&cutting.middle(generators, [(a.1, a.2), (b.1, b.2)]))
+                plane.chart().flatten(&cutting.between(generators, [(a.1, a.2), (b.1, b.2)]))
             });
         }
     }
