@@ -28,7 +28,7 @@ impl<const D: usize> DirectionBox<D> {
         let length = centre.norm();
         let nearest = units.iter().map(|unit| centre.dot(unit) / length).fold(f64::INFINITY, f64::min);
         // Not a number where the generators cancel.
-        if !(nearest > WIDE) {
+        if nearest.is_nan() || nearest <= WIDE {
             return whole;
         }
         let blow_up = (1.0 + 1e-12) / nearest;

@@ -42,7 +42,7 @@ pub struct OverBudget {
 }
 
 /// The fraction of the cosine-weighted hemisphere over a point that is open: 1 if nothing occludes it, 0 if all is
-/// covered (method of the [module](super)). In a closed form; the error is of rounding only, below 1e-12 in all tests.
+/// covered (method of the [module](super)). In a closed form; the error is of rounding only, below 1e-14 in all tests.
 ///
 /// `normal` is taken as a direction and need not be of unit length. `incident` lists for each simplex that contains
 /// the point its other D - 1 vertices (the first D - 1 entries; the last is not read), `others` the vertices of all

@@ -191,7 +191,7 @@ impl<const D: usize> Chart<D> {
         let mut axis = unit_normal * -image;
         axis[D - 1] += 1.0;
         // A reflection turns handedness over once, moving the last axis to the front D - 1 times.
-        let moves = if D % 2 == 0 { -1.0 } else { 1.0 };
+        let moves = if D.is_multiple_of(2) { -1.0 } else { 1.0 };
         Self { axis, factor: 2.0 / axis.norm_squared(), handedness: -image * moves }
     }
 

@@ -268,3 +268,66 @@ impl<const D: usize> Hole<D> {
         if region.inward().any(parted) { Relation::Apart } else { Relation::Overlapping }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn sphere<const D: usize>() -> f64 {
+        if D == 3 { 2.0 * PI } else { 4.0 * PI }
+    }
+
+    fn orthants<const D: usize>() {
+        let line = Flat::new(0.48, 0.6, if D == 3 { 0.0 } else { 0.64 }).normalize();
+        let (mut whole, mut behind, mut before) = (0.0, 0.0, 0.0);
+        for orthant in Region::<D>::whole() {
+            assert!((orthant.measure() - sphere::<D>() / f64::from(1 << (D - 1))).abs() < 1e-15);
+            whole += orthant.measure();
+            let (back, front) = orthant.split(&line);
+            behind += back.map_or(0.0, |region| region.measure());
+            before += front.map_or(0.0, |region| region.measure());
+        }
+        assert!((whole - sphere::<D>()).abs() < 1e-14);
+        assert!((behind - whole / 2.0).abs() < 1e-14 && (before - whole / 2.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn orthants_make_the_sphere_and_any_line_halves_it() {
+        orthants::<3>();
+        orthants::<4>();
+    }
+
+    #[test]
+    fn half_of_all_directions_has_its_measure() {
+        // Three corners on a circle, not quite: the region may be all that is inside it.
+        for height in [0.0, 1e-17, 1e-9] {
+            let corner = |angle: f64| Flat::new(angle.cos(), angle.sin(), height).normalize();
+            let half = Region::<4>::new([0.0, 2.1, 4.2].map(corner).to_vec());
+            assert!((half.measure() - 2.0 * PI).abs() < 1e-7 && half.is_nearly_half());
+            let (behind, before) = half.split(&Flat::x());
+            let sum = behind.unwrap().measure() + before.unwrap().measure();
+            assert!((sum - half.measure()).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn relations_of_regions_and_holes() {
+        let triangle = |scale: f64, x: f64| {
+            let corners = [(1.0, 0.0), (-0.5, 0.8), (-0.5, -0.8)];
+            corners.map(|(a, b)| Flat::new(scale * a + x, scale * b, 1.0).normalize()).to_vec()
+        };
+        let hole = Hole::<4>::new(triangle(0.5, 0.0)).unwrap();
+        assert_eq!(hole.relation(&Region::new(triangle(0.2, 0.0))), Relation::Within);
+        assert_eq!(hole.relation(&Region::new(triangle(0.5, 0.0))), Relation::Within);
+        assert_eq!(hole.relation(&Region::new(triangle(0.5, 0.1))), Relation::Overlapping);
+        assert_eq!(hole.relation(&Region::new(triangle(2.0, 0.0))), Relation::Overlapping);
+        assert_eq!(hole.relation(&Region::new(triangle(0.1, 2.0))), Relation::Apart);
+        assert_eq!(hole.lines().len(), 3);
+        // A fourth corner in the middle of an edge, up to rounding, is no corner.
+        let mut corners = triangle(0.5, 0.0);
+        corners.insert(1, (corners[0] + corners[1]).normalize());
+        assert_eq!(Hole::<4>::new(corners).unwrap().lines().len(), 3);
+        assert!(Hole::<4>::new(vec![Flat::x(), Flat::x(), Flat::y()]).is_none());
+    }
+}

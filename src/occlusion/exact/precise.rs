@@ -108,10 +108,8 @@ fn cross_of<T: Copy, const D: usize>(
     std::array::from_fn(|skip| {
         // The rows left, in order, with the first two exchanged where the cofactor's sign is negative.
         let mut rows = [0; D];
-        let mut count = 0;
-        for row in (0..D).filter(|&row| row != skip) {
-            rows[count] = row;
-            count += 1;
+        for (place, row) in (0..D).filter(|&row| row != skip).enumerate() {
+            rows[place] = row;
         }
         if skip % 2 == 1 {
             rows.swap(0, 1);

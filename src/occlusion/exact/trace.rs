@@ -25,13 +25,13 @@ impl<const D: usize> SimplicialCone<D> {
 
     /// The side of facet k's plane on which the cone lies: the sign of det[g_k, the others].
     pub fn side_of_facet(&self, k: usize) -> i32 {
-        if k % 2 == 0 { self.orientation } else { -self.orientation }
+        if k.is_multiple_of(2) { self.orientation } else { -self.orientation }
     }
 
     /// The sign of the determinant of the generators, taken in the order given by their places.
     fn sign_of_order(&self, order: &[usize]) -> i32 {
         let inversions: usize = (0..order.len()).map(|i| order[..i].iter().filter(|&&j| j > order[i]).count()).sum();
-        if inversions % 2 == 0 { self.orientation } else { -self.orientation }
+        if inversions.is_multiple_of(2) { self.orientation } else { -self.orientation }
     }
 }
 
@@ -151,4 +151,64 @@ pub(super) fn facet_above_horizon<const D: usize>(
         }
     }
     halve_long_edges(plane, horizon, generators, &corners)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Vector, widen};
+    use crate::occlusion::exact::polygon::Region;
+    use crate::occlusion::exact::span::Span;
+
+    /// All cones over D of a few points, in the horizon and in each other's facets' planes: the corners must turn
+    /// anticlockwise, and lie in the cone.
+    fn check<const D: usize>() {
+        let points: Vec<Vector<D>> = (0..8)
+            .map(|k| {
+                Vector::from_fn(|r, _| {
+                    ((k * 5 + r * r * 3 + k * r * 2) % 13) as f32 - if r % 2 == 0 { 5.5 } else { 6.0 }
+                })
+            })
+            .collect();
+        let normal = Vector::<D>::from_fn(|r, _| [0.3, -0.2, 0.9, 0.4][r]);
+        let mut generators = Generators::new(Vector::zeros(), normal);
+        let ids: Vec<u32> = points.iter().map(|point| generators.edge_to(point)).collect();
+        let mut cones = Vec::new();
+        for subset in (0u32..1 << ids.len()).filter(|subset| subset.count_ones() == D as u32) {
+            let mut chosen = ids.iter().copied().filter(|id| subset >> (id - 1) & 1 == 1);
+            let numbers: [u32; D] = std::array::from_fn(|_| chosen.next().unwrap());
+            let sign = crate::geometry::determinant_sign(&numbers.map(|id| generators.column(id)));
+            if sign != 0 {
+                cones.push(SimplicialCone { generators: numbers, orientation: sign });
+            }
+        }
+        let mut planes = vec![Plane::horizon(&widen(&normal))];
+        planes.extend(
+            cones.iter().take(6).map(|cone| Plane::of_facet(&generators, Span::new(&generators, cone.facet(1)))),
+        );
+        let mut kinds = [0; 4];
+        for plane in &planes {
+            for cone in &cones {
+                let found = trace(plane, &generators, cone, |id| plane.side(&generators, id));
+                let (kind, corners) = match found {
+                    Trace::None => (0, Vec::new()),
+                    Trace::Across(corners) => (1, corners),
+                    Trace::Above(corners) => (2, corners),
+                    Trace::Below(corners) => (3, corners),
+                };
+                kinds[kind] += 1;
+                if kind > 0 {
+                    assert!(Region::<D>::new(corners.clone()).measure() > 0.0, "{cone:?}: {corners:?}");
+                    assert!(D == 3 || corners[0].dot(&corners[1].cross(&corners[2])) > -1e-15, "{corners:?}");
+                }
+            }
+        }
+        assert!(kinds.iter().all(|&count| count > 0), "{kinds:?}");
+    }
+
+    #[test]
+    fn corners_turn_anticlockwise() {
+        check::<3>();
+        check::<4>();
+    }
 }
