@@ -13,6 +13,7 @@
 //!   convex surroundings block nothing; a concave fold blocks the same, be the surface open or closed;
 //! - a visible point inside a simplex ignores that simplex.
 
+pub mod exact;
 mod file;
 mod sampling;
 mod site;
