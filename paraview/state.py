@@ -289,7 +289,7 @@ def show_lines(source, v):
     d = Show(source, v)
     d.SetRepresentationType('Wireframe')
     d.ColorArrayName = [None, '']
-    setp(d, AmbientColor=LINES, DiffuseColor=LINES, Ambient=1.0, Diffuse=0.0, LineWidth=1.2)
+    setp(d, AmbientColor=LINES, DiffuseColor=LINES, Ambient=1.0, Diffuse=0.0, LineWidth=1.0)
 
 
 def show_cells(source, v, array, relief):
