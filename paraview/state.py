@@ -491,6 +491,8 @@ def build_figure():
             show_caption(panel['caption'], v)
     layout.SetSize(size)
     SetActiveSource(readers[0])
+    if first is not None:
+        SetActiveView(first)
     return layout, size
 
 
