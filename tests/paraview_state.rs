@@ -98,11 +98,11 @@ fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
     }
 }
 
-/// Runs a program under an X server of its own; ParaView is given two minutes.
+/// Runs a program under an X server of its own; ParaView is given five minutes.
 fn run(program: &str, arguments: &[&Path], folder: &Path) -> Output {
     let headless = Path::new(env!("CARGO_MANIFEST_DIR")).join("paraview/headless");
     Command::new(&headless)
-        .args(["timeout", "120", program])
+        .args(["timeout", "300", program])
         .args(arguments)
         .current_dir(folder)
         .output()
