@@ -20,6 +20,7 @@
 pub mod accel;
 pub mod export;
 pub mod geometry;
+pub mod inspect;
 pub mod mesh;
 pub mod occlusion;
 pub mod pipeline;
