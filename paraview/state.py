@@ -22,14 +22,22 @@ import paraview.simple
 
 # ---------------------------------------------------------------------------------------------- the figure: edit here
 
+# The volumes from left to right; files beside this one.
 PANELS = @PANELS@
-SOURCE = @SOURCE@           # 'vti', or 'raw' for float32 triples without a header
-CUT = @CUT@                 # None, ('octant', corner or None), or ('plane', axis 0 to 2, position)
-SCREENSHOT = @SCREENSHOT@   # the picture's name, or None
-SIZE = @SIZE@               # the picture's width and height in pixels, or None: as the panels need
-RELIEF = 0.3                # how much a voxel's face is dimmed by its direction; 0: not at all
-CAMERA = (1.0, 0.72, 1.45)  # from where the volumes are seen, against the middle of the image; +y is up
-LINES = (0.62, 0.62, 0.62)  # the colour of outlines
+# 'vti', or 'raw' for float32 triples without a header.
+SOURCE = @SOURCE@
+# None, ('octant', its corner or None for the middle), or ('plane', 0 to 2 for x to z, position).
+CUT = @CUT@
+# The picture's name, or None.
+SCREENSHOT = @SCREENSHOT@
+# The picture's width and height in pixels, or None: as the panels need.
+SIZE = @SIZE@
+# How much the faces of voxels are dimmed by their direction; 0: not at all.
+RELIEF = 0.3
+# From where the volumes are seen, against the middle of the image; +y is up.
+CAMERA = (1.0, 0.72, 1.45)
+# The colours of outlines and of text.
+LINES = (0.62, 0.62, 0.62)
 TEXT = (0.0, 0.0, 0.0)
 
 # ParaView runs the script of a programmable filter among this file's own names, and puts all of numpy's there: `max`,
@@ -281,7 +289,7 @@ def show_lines(source, v):
     d = Show(source, v)
     d.SetRepresentationType('Wireframe')
     d.ColorArrayName = [None, '']
-    setp(d, AmbientColor=LINES, DiffuseColor=LINES, Ambient=1.0, Diffuse=0.0, LineWidth=1.2)
+    setp(d, AmbientColor=LINES, DiffuseColor=LINES, Ambient=1.0, Diffuse=0.0, LineWidth=1.0)
 
 
 def show_cells(source, v, array, relief):
@@ -319,7 +327,8 @@ def show_volume(panel, reader, array, centre, v):
         d.ColorArrayName = ['POINTS', 'rgba']
         d.LookupTable = GetColorTransferFunction('rgba')
         d.ScalarOpacityFunction = GetOpacityTransferFunction('rgba')
-        setp(d, MapScalars=0, ScalarOpacityUnitDistance=smallest(panel['spacing']), VolumeRenderingMode='Smart', Shade=0)
+        setp(d, MapScalars=0, ScalarOpacityUnitDistance=smallest(panel['spacing']), VolumeRenderingMode='Smart',
+             Shade=0)
         Hide(reader, v)
 
 
@@ -482,6 +491,8 @@ def build_figure():
             show_caption(panel['caption'], v)
     layout.SetSize(size)
     SetActiveSource(readers[0])
+    if first is not None:
+        SetActiveView(first)
     return layout, size
 
 

@@ -3,6 +3,8 @@
 
 mod bvh;
 mod tracer;
+mod wide;
 
 pub use bvh::{Bvh, Node};
 pub use tracer::{Hit, Tracer};
+pub use wide::{Leaf, Scale, TAG_BITS, WIDTH, WideBvh, WideNode};

@@ -4,8 +4,9 @@
 //! simplex in turn; the hierarchy only saves the work.
 
 use std::cmp::Ordering;
+use std::sync::OnceLock;
 
-use super::Bvh;
+use super::{Bvh, WideBvh};
 use crate::geometry::{Aabb, Cone, Ray};
 use crate::mesh::Mesh;
 
@@ -14,6 +15,7 @@ use crate::mesh::Mesh;
 pub struct Tracer<'m, const D: usize> {
     mesh: &'m Mesh<D>,
     bvh: Bvh<D>,
+    wide: OnceLock<WideBvh<D>>,
 }
 
 /// The simplex that a ray hits first.
@@ -33,7 +35,7 @@ impl<'m, const D: usize> Tracer<'m, D> {
         let bounds: Vec<Aabb<D>> = (0..mesh.simplices.len() as u32).map(|s| Aabb::of(mesh.corners(s).iter())).collect();
         let mut solid: Vec<u32> = (0..mesh.simplices.len() as u32).collect();
         solid.retain(|s| mesh.degenerate.binary_search(s).is_err());
-        Self { mesh, bvh: Bvh::build(solid, &bounds) }
+        Self { mesh, bvh: Bvh::build(solid, &bounds), wide: OnceLock::new() }
     }
 
     /// The mesh it was made of.
@@ -46,17 +48,22 @@ impl<'m, const D: usize> Tracer<'m, D> {
         &self.bvh
     }
 
+    /// The same hierarchy laid out for SIMD; made when first asked for.
+    pub fn wide(&self) -> &WideBvh<D> {
+        self.wide.get_or_init(|| WideBvh::new(&self.bvh, self.mesh))
+    }
+
+    /// Whether the ray hits this simplex at a distance in `(0, limit]`.
+    #[inline]
+    pub fn hits(&self, simplex: u32, ray: &Ray<D>, limit: f32) -> bool {
+        let cone = Cone::of_simplex(&ray.origin, &self.mesh.corners(simplex));
+        cone.contains(&ray.direction) && (limit == f32::INFINITY || cone.crossing(&ray.direction).t <= f64::from(limit))
+    }
+
     /// Whether the ray hits any simplex but `ignored` at a distance in `(0, limit]`.
     #[inline]
     pub fn occluded(&self, ray: &Ray<D>, limit: f32, ignored: Option<u32>) -> bool {
-        self.bvh.any(ray, limit, |simplex| {
-            if ignored == Some(simplex) {
-                return false;
-            }
-            let cone = Cone::of_simplex(&ray.origin, &self.mesh.corners(simplex));
-            cone.contains(&ray.direction)
-                && (limit == f32::INFINITY || cone.crossing(&ray.direction).t <= f64::from(limit))
-        })
+        self.bvh.any(ray, limit, |simplex| ignored != Some(simplex) && self.hits(simplex, ray, limit))
     }
 
     /// The simplex that the ray hits first, if any.

@@ -71,6 +71,9 @@ impl<const D: usize> Cone<D> {
         let determinant_bound = bounds[0] * lengths[0];
         let orientation = if determinant.abs() > determinant_bound {
             if determinant > 0.0 { 1 } else { -1 }
+        } else if determinant_bound == 0.0 {
+            // A column is zero: the origin is a corner of the simplex.
+            0
         } else {
             determinant_sign(&columns)
         };

@@ -25,6 +25,12 @@ impl<const D: usize> Frame<D> {
         Self { axis, factor: 2.0 / square, turned }
     }
 
+    /// The axis a of the reflection, the factor 2 / a.a, and whether the sign is turned: what [`Frame::to_world`]
+    /// works with, for code that turns many directions at once by the same operations.
+    pub fn parts(&self) -> (&Vector<D>, f32, bool) {
+        (&self.axis, self.factor, self.turned)
+    }
+
     /// A local direction, whose last component is along the normal, in the coordinates of the scene.
     #[inline]
     pub fn to_world(&self, local: &Vector<D>) -> Vector<D> {

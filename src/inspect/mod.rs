@@ -10,7 +10,7 @@
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
 //! | `.raw` | colours without a header: only how many |
 //!
-//! From there [`compare`] goes number by number, and [`Info`] describes: ranges of arrays, and of a simplicial mesh
+//! From there [`compare()`] goes number by number, and [`Info`] describes: ranges of arrays, and of a simplicial mesh
 //! whether it is closed, oriented and welded ([`surface`]).
 
 mod error;
@@ -78,7 +78,7 @@ impl Contents {
         }
     }
 
-    /// The names of its arrays, as [`compare`] takes them.
+    /// The names of its arrays, as [`compare()`] takes them.
     pub fn array_names(&self) -> Vec<&str> {
         fn names(arrays: &[Array]) -> Vec<&str> {
             arrays.iter().map(|a| a.name.as_str()).collect()

@@ -13,15 +13,18 @@
 //!   convex surroundings block nothing; a concave fold blocks the same, be the surface open or closed;
 //! - a visible point inside a simplex ignores that simplex.
 
+pub mod exact;
 mod file;
 mod sampling;
 mod site;
+mod stream;
 mod vertices;
 
 pub use file::{FileError, Sidecar, decode, encode};
 pub use sampling::{Sampler, Sequence, cube_to_ball, square_to_disk};
 pub use site::Site;
-pub use vertices::{ambient_occlusion, at_vertices, error_estimate};
+pub use stream::{Level, Stream};
+pub use vertices::{ambient_occlusion, at_vertices, at_vertices_with, error_estimate};
 
 /// How ambient occlusion is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]

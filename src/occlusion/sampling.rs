@@ -19,7 +19,7 @@ use crate::geometry::{Frame, Vector};
 
 /// Lowest squared cosine that a direction gets. A direction closer to the horizon is raised to it, so that rounding
 /// can't put it below; this touches 1.5 rays in a million, and moves each by less than 0.06 degrees.
-const LOWEST_SQUARED_COSINE: f32 = 1e-6;
+pub(super) const LOWEST_SQUARED_COSINE: f32 = 1e-6;
 
 /// How the points of the cube are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,16 +33,16 @@ pub enum Sampler {
 /// The points of one shading point: `count` points of the unit (D-1)-cube.
 #[derive(Debug)]
 pub struct Sequence {
-    source: Source,
-    next: u32,
+    pub(super) source: Source,
+    pub(super) next: u32,
 }
 
 /// What makes the points.
 #[derive(Debug)]
-enum Source {
+pub(super) enum Source {
     /// Keys of the scramblings of the coordinates and of the index.
     Sobol([u32; 4]),
-    Random(ChaCha8Rng),
+    Random(Box<ChaCha8Rng>),
 }
 
 impl Sequence {
@@ -51,7 +51,7 @@ impl Sequence {
     pub fn new(sampler: Sampler, seed: u64, site: u64) -> Self {
         let mut state = mix(seed ^ mix(site.wrapping_add(0x9e37_79b9_7f4a_7c15)));
         let source = match sampler {
-            Sampler::Random => Source::Random(ChaCha8Rng::seed_from_u64(state)),
+            Sampler::Random => Source::Random(Box::new(ChaCha8Rng::seed_from_u64(state))),
             Sampler::Sobol => Source::Sobol(std::array::from_fn(|_| {
                 state = mix(state.wrapping_add(0x9e37_79b9_7f4a_7c15));
                 (state >> 32) as u32
@@ -117,14 +117,20 @@ fn mix(mut x: u64) -> u64 {
 /// Nested uniform scrambling of the bits of `x`, highest first, by a hash: each bit is flipped by a function of the
 /// key and the bits above it (Laine and Karras 2011, with Vegdahl's constants).
 #[inline]
-fn scramble(x: u32, key: u32) -> u32 {
-    let mut x = x.reverse_bits();
+pub(super) fn scramble(x: u32, key: u32) -> u32 {
+    scramble_reversed(x.reverse_bits(), key).reverse_bits()
+}
+
+/// The same for a number, and with a result, whose lowest bit is the first.
+#[inline(always)]
+pub(super) fn scramble_reversed(x: u32, key: u32) -> u32 {
+    let mut x = x;
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(key);
     x = x.wrapping_mul((key >> 16) | 1);
     x ^= x.wrapping_mul(0x0552_6c56);
     x ^= x.wrapping_mul(0x53a2_2864);
-    x.reverse_bits()
+    x
 }
 
 /// Direction numbers of the second and third Sobol' dimension (Joe and Kuo 2008); the first is the reversed index.
@@ -152,7 +158,7 @@ const fn sobol_matrix(s: usize, a: u32, m: &[u32]) -> [u32; 32] {
 
 /// Coordinate `dimension` (0, 1 or 2) of Sobol' point `index`, as a binary fraction of 32 bits.
 #[inline]
-fn sobol(mut index: u32, dimension: usize) -> u32 {
+pub(super) const fn sobol(mut index: u32, dimension: usize) -> u32 {
     if dimension == 0 {
         return index.reverse_bits();
     }

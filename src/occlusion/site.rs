@@ -2,7 +2,28 @@
 
 use crate::accel::Tracer;
 use crate::geometry::{Column, Cone, Frame, Ray, Vector, widen};
-use crate::mesh::Incidence;
+use crate::mesh::{Incidence, Mesh};
+
+/// What a simplex with a corner at the point hides: the cone of its edges from there and -normal. None if it is wholly
+/// below the tangent hyperplane, and hides nothing above it.
+pub(super) fn fold_cone<const D: usize>(
+    mesh: &Mesh<D>,
+    position: Vector<D>,
+    normal: Vector<D>,
+    identity: u32,
+    simplex: u32,
+) -> Option<Cone<D>> {
+    let mut columns = [Column::vector(-normal); D];
+    let mut rises = false;
+    let others = mesh.simplices[simplex as usize].into_iter();
+    for (column, v) in columns.iter_mut().zip(others.filter(|&v| mesh.identity[v as usize] != identity)) {
+        let other = mesh.vertices[v as usize];
+        *column = Column::edge(other, position);
+        let edge = widen(&other) - widen(&position);
+        rises |= edge.dot(&widen(&normal)) > 0.0;
+    }
+    rises.then(|| Cone::new(columns))
+}
 
 /// A shading point: a place, a normal, and the simplices around it that rays can't be traced against.
 #[derive(Clone, Debug)]
@@ -25,19 +46,7 @@ impl<const D: usize> Site<D> {
         let normal = mesh.normals[vertex as usize];
         let identity = mesh.identity[vertex as usize];
         let fold = (incidence.around(identity).iter())
-            .filter_map(|&simplex| {
-                // A simplex wholly below the tangent hyperplane hides nothing above it.
-                let mut columns = [Column::vector(-normal); D];
-                let mut rises = false;
-                let others = mesh.simplices[simplex as usize].into_iter();
-                for (column, v) in columns.iter_mut().zip(others.filter(|&v| mesh.identity[v as usize] != identity)) {
-                    let other = mesh.vertices[v as usize];
-                    *column = Column::edge(other, position);
-                    let edge = widen(&other) - widen(&position);
-                    rises |= edge.dot(&widen(&normal)) > 0.0;
-                }
-                rises.then(|| Cone::new(columns))
-            })
+            .filter_map(|&simplex| fold_cone(mesh, position, normal, identity, simplex))
             .collect();
         Self { position, normal, fold, ignored: None }
     }

@@ -1,0 +1,356 @@
+//! ParaView itself runs the states that the library writes, and the pictures are looked at pixel by pixel.
+//!
+//! These tests need ParaView, Xvfb and the Python environment that `tests/install` makes; `tests/all` runs them.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use ao4d::export::paraview::{Axis, Cut, Figure, Panel, Source, state};
+use ao4d::volume::Grid;
+
+/// A small image: its grid, and the colour of each voxel, none where there is nothing.
+struct Image {
+    grid: Grid,
+    voxels: Vec<Option<[u8; 3]>>,
+}
+
+impl Image {
+    fn new(grid: Grid, colour: impl Fn([usize; 3]) -> Option<[u8; 3]>) -> Self {
+        let [nx, ny, nz] = grid.dimensions;
+        let voxels = (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])));
+        Image { grid, voxels: voxels.map(colour).collect() }
+    }
+
+    /// As `.vti`, in characters, so that these tests stand on no writer of the library.
+    fn write_vti(&self, path: &Path) {
+        let [x, y, z] = self.grid.dimensions.map(|n| n - 1);
+        let ([ox, oy, oz], [sx, sy, sz]) = (self.grid.origin, self.grid.spacing);
+        let (mut rgba, mut opacity) = (String::new(), String::new());
+        for voxel in &self.voxels {
+            let [r, g, b] = voxel.unwrap_or([255; 3]);
+            let opaque = u8::from(voxel.is_some());
+            write!(rgba, "{r} {g} {b} {} ", 255 * opaque).unwrap();
+            write!(opacity, "{opaque} ").unwrap();
+        }
+        let text = format!(
+            r#"<?xml version="1.0"?>
+<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{ox} {oy} {oz}" Spacing="{sx} {sy} {sz}">
+<Piece Extent="0 {x} 0 {y} 0 {z}"><PointData Scalars="rgba">
+<DataArray type="UInt8" Name="rgba" NumberOfComponents="4" format="ascii">{rgba}</DataArray>
+<DataArray type="Float32" Name="opacity" format="ascii">{opacity}</DataArray>
+</PointData></Piece></ImageData></VTKFile>"#
+        );
+        fs::write(path, text).unwrap();
+    }
+
+    /// As `.raw`: float32 triples.
+    fn write_raw(&self, path: &Path) {
+        let channels = self.voxels.iter().flat_map(|v| v.unwrap_or([255; 3]));
+        let bytes: Vec<u8> = channels.flat_map(|c| (f32::from(c) / 255.0).to_le_bytes()).collect();
+        fs::write(path, bytes).unwrap();
+    }
+}
+
+fn cube(n: usize) -> Grid {
+    let spacing = 2.0 / n as f64;
+    Grid { dimensions: [n; 3], origin: [spacing / 2.0 - 1.0; 3], spacing: [spacing; 3] }
+}
+
+/// A ball in the middle, grey all over, or dark towards -x as if occluded.
+fn ball(occluded: bool) -> Image {
+    let grid = cube(20);
+    Image::new(grid, |index| {
+        let [x, y, z] = grid.point(index);
+        let inside = x * x + y * y + z * z < 0.7;
+        inside.then_some([if occluded { 4 + 10 * index[0] as u8 } else { 204 }; 3])
+    })
+}
+
+/// Bars from the middle: red towards +x, green towards +y, blue towards +z.
+fn axes() -> Image {
+    let grid = Grid { dimensions: [21; 3], origin: [-7.0, 0.5, 3.0], spacing: [0.1; 3] };
+    Image::new(grid, |index| {
+        let along = |axis: usize| index[axis] > 12 && (0..3).all(|a| a == axis || index[a].abs_diff(10) < 3);
+        if index.iter().all(|i| i.abs_diff(10) < 3) {
+            return Some([90, 90, 90]);
+        }
+        (0..3).find(|&axis| along(axis)).map(|axis| std::array::from_fn(|c| if c == axis { 200 } else { 0 }))
+    })
+}
+
+fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
+    let panel = |&(file, caption, image): &(&str, &str, &Image)| Panel {
+        file: file.into(),
+        caption: caption.into(),
+        grid: image.grid,
+    };
+    Figure {
+        title: "test".into(),
+        program: "ao4d".into(),
+        panels: panels.iter().map(panel).collect(),
+        source,
+        cut: Cut::Octant { corner: None },
+        screenshot: Some("figure.png".into()),
+        size: Some([800, 500]),
+    }
+}
+
+/// Runs a program under an X server of its own; ParaView is given five minutes.
+fn run(program: &str, arguments: &[&Path], folder: &Path) -> Output {
+    let headless = Path::new(env!("CARGO_MANIFEST_DIR")).join("paraview/headless");
+    Command::new(&headless)
+        .args(["timeout", "300", program])
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap_or_else(|e| panic!("{} does not start: {e}; run tests/install", headless.display()))
+}
+
+/// Runs a state that is to succeed.
+fn draw(program: &str, arguments: &[&Path], folder: &Path) {
+    let output = run(program, arguments, folder);
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{program} failed with {}:\n{out}\n{err}", output.status);
+    assert!(!err.contains("ERR|") && !err.contains("Traceback"), "{program} complains:\n{out}\n{err}");
+    assert!(out.contains("wrote "), "{program} wrote nothing:\n{out}\n{err}");
+}
+
+#[derive(PartialEq)]
+struct Picture {
+    width: usize,
+    height: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+impl Picture {
+    fn read(path: &Path) -> Self {
+        let file = fs::File::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut bytes).unwrap();
+        assert_eq!(info.bit_depth, png::BitDepth::Eight);
+        let pixels = bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect();
+        Picture { width: info.width as usize, height: info.height as usize, pixels }
+    }
+
+    /// The pixels of a part, its corners given in fractions from the left and from the top, with their places in it
+    /// from 0 to 1.
+    fn part(&self, [left, right]: [f64; 2], [top, bottom]: [f64; 2]) -> Vec<([f64; 2], [u8; 3])> {
+        let at = |fraction: f64, size: usize| (fraction * size as f64).round() as usize;
+        let (x0, x1) = (at(left, self.width), at(right, self.width));
+        let (y0, y1) = (at(top, self.height), at(bottom, self.height));
+        let place = |x: usize, y: usize| [(x - x0) as f64 / (x1 - x0) as f64, (y - y0) as f64 / (y1 - y0) as f64];
+        let rows = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
+        rows.map(|(x, y)| (place(x, y), self.pixels[x + self.width * y])).collect()
+    }
+}
+
+/// How many pixels have a colour.
+fn count(part: &[([f64; 2], [u8; 3])], colour: impl Fn([u8; 3]) -> bool) -> usize {
+    part.iter().filter(|p| colour(p.1)).count()
+}
+
+/// The mean place of the pixels in which one channel stands out.
+fn centre(part: &[([f64; 2], [u8; 3])], channel: usize) -> [f64; 2] {
+    let stands_out = |c: &[u8; 3]| (0..3).all(|k| k == channel || i32::from(c[channel]) - i32::from(c[k]) > 60);
+    let found: Vec<_> = part.iter().filter(|p| stands_out(&p.1)).map(|p| p.0).collect();
+    assert!(found.len() > 20, "channel {channel} is seen in {} pixels only", found.len());
+    std::array::from_fn(|a| found.iter().map(|p| p[a]).sum::<f64>() / found.len() as f64)
+}
+
+fn scratch() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// Writes a state and returns where it is.
+fn write_state(folder: &Path, figure: &Figure) -> PathBuf {
+    let path = folder.join("figure.py");
+    fs::write(&path, state(figure)).unwrap();
+    path
+}
+
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn the_picture_shows_both_volumes_wherever_the_folder_is() {
+    let folder = scratch();
+    let (with, without) = (ball(true), ball(false));
+    with.write_vti(&folder.path().join("with.vti"));
+    without.write_vti(&folder.path().join("without.vti"));
+    let figure =
+        figure(Source::Vti, &[("with.vti", "with ambient occlusion", &with), ("without.vti", "without", &without)]);
+    write_state(folder.path(), &figure);
+    draw("pvbatch", &[Path::new("figure.py")], folder.path());
+    let picture = Picture::read(&folder.path().join("figure.png"));
+    assert_eq!((picture.width, picture.height), (800, 500));
+
+    // The captions and the corners: black on white.
+    assert!(count(&picture.part([0.0, 0.5], [0.0, 0.1]), |c| c[0] < 40) > 50, "no caption");
+    for corner in [0, 799, 800 * 499, 800 * 500 - 1] {
+        assert_eq!(picture.pixels[corner], [255; 3], "the background is white");
+    }
+    // The slices show the colours of the files exactly: all the greys on the left, the one grey on the right.
+    let (left, right) = (picture.part([0.0, 0.5], [0.72, 0.92]), picture.part([0.5, 1.0], [0.72, 0.92]));
+    for grey in (4..18).map(|i| 4 + 10 * i as u8) {
+        assert!(count(&left, |c| c == [grey; 3]) > 20, "no pixel has the grey {grey} of the file");
+    }
+    assert!(count(&right, |c| c == [204; 3]) > 3000, "the second volume is not seen");
+    assert_eq!(count(&right, |c| c[0] < 120), 0, "the second volume has dark voxels");
+    assert_eq!(count(&left, |c| c[0] != c[1] || c[1] != c[2]), 0, "grey has turned to a colour");
+    // The cut volumes: grey of 204 dimmed by at most three tenths; darker and lighter on the left, darker in the mean.
+    let (left, right) = (picture.part([0.1, 0.4], [0.2, 0.6]), picture.part([0.6, 0.9], [0.2, 0.6]));
+    let solid = |c: [u8; 3]| c[0] < 206;
+    assert!(count(&left, solid) > 8000 && count(&right, solid) > 8000, "the volumes are not seen");
+    assert!(count(&left, |c| c[0] < 100) > 1000, "the occluded side is not dark");
+    assert!(count(&right, |c| c[0] < 138) < 50, "a volume without occlusion is dark");
+
+    // The same picture, bit by bit, after the folder has moved, from another folder, into a third.
+    let elsewhere = scratch();
+    let moved = elsewhere.path().join("a b'\u{e9}");
+    let pictures = elsewhere.path().join("pictures").join("new");
+    fs::rename(folder.path(), &moved).unwrap();
+    fs::remove_file(moved.join("figure.png")).unwrap();
+    draw("pvbatch", &[&moved.join("figure.py"), Path::new("pictures/new")], elsewhere.path());
+    assert!(!moved.join("figure.png").exists(), "the picture goes where it is told");
+    assert!(Picture::read(&pictures.join("figure.png")) == picture, "the moved folder gives another picture");
+
+    // And by way of raw numbers, under ParaView's other interpreter, whose pictures may differ in a few pixels.
+    with.write_raw(&moved.join("with.raw"));
+    without.write_raw(&moved.join("without.raw"));
+    let mut raw = figure;
+    raw.source = Source::Raw;
+    raw.panels[0].file = "with.raw".into();
+    raw.panels[1].file = "without.raw".into();
+    write_state(&moved, &raw);
+    draw("pvpython", &[&moved.join("figure.py")], elsewhere.path());
+    let by_raw = Picture::read(&moved.join("figure.png"));
+    let different = by_raw.pixels.iter().zip(&picture.pixels).filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 2));
+    let different = different.count();
+    assert!(different < 400, "{different} pixels differ between .raw and .vti");
+}
+
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn no_axis_is_mirrored() {
+    let folder = scratch();
+    let axes = axes();
+    let check = |source: Source, file: &str| {
+        let mut figure = figure(source, &[(file, "", &axes)]);
+        figure.cut = Cut::None;
+        figure.size = Some([480, 600]);
+        write_state(folder.path(), &figure);
+        draw("pvbatch", &[Path::new("figure.py")], folder.path());
+        let picture = Picture::read(&folder.path().join("figure.png"));
+        // From the upper right in front: x to the right, y up, z towards the viewer and so to the lower left.
+        let volume = picture.part([0.0, 1.0], [0.0, 0.7]);
+        let [red, green, blue] = [0, 1, 2].map(|channel| centre(&volume, channel));
+        assert!(
+            red[0] > green[0] + 0.05 && red[0] > blue[0] + 0.1,
+            "x is not to the right: {red:?} {green:?} {blue:?}"
+        );
+        assert!(green[1] < red[1] - 0.05 && green[1] < blue[1] - 0.1, "y is not up: {red:?} {green:?} {blue:?}");
+        assert!(blue[0] < green[0] - 0.05 && blue[1] > red[1], "z is not to the front: {red:?} {green:?} {blue:?}");
+        // The slices xy, xz and zy: their first axis to the right, their second up.
+        for (slice, (right, up)) in [(0, 1), (0, 2), (2, 1)].into_iter().enumerate() {
+            let thirds = [slice as f64 / 3.0, (slice + 1) as f64 / 3.0];
+            let part = picture.part(thirds, [0.7, 1.0]);
+            let (r, u) = (centre(&part, right), centre(&part, up));
+            assert!(r[0] > u[0] + 0.15 && u[1] < r[1] - 0.15, "slice {slice} of {file}: {r:?} {u:?}");
+            let exact = |channel: usize| count(&part, |c| (0..3).all(|k| c[k] == if k == channel { 200 } else { 0 }));
+            assert!(exact(right) > 100 && exact(up) > 100, "the colours of {file} are not shown as they are");
+        }
+    };
+    axes.write_vti(&folder.path().join("axes.vti"));
+    check(Source::Vti, "axes.vti");
+    axes.write_raw(&folder.path().join("axes.raw"));
+    check(Source::Raw, "axes.raw");
+}
+
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn images_plane_cuts_and_empty_volumes() {
+    let folder = scratch();
+    // A 3D scene: one layer, dark below on the left.
+    let grid = Grid { dimensions: [40, 30, 1], origin: [-0.975, -0.725, 0.0], spacing: [0.05, 0.05, 1.0] };
+    let flat = Image::new(grid, |[i, j, _]| (j < 15).then_some([if i < 20 { 60 } else { 204 }; 3]));
+    let empty = Image::new(cube(6), |_| None);
+    let solid = Image::new(cube(8), |[_, _, k]| Some([if k == 3 { 77 } else { 204 }; 3]));
+    for (name, image) in [("flat.vti", &flat), ("empty.vti", &empty), ("solid.vti", &solid)] {
+        image.write_vti(&folder.path().join(name));
+    }
+    let panels = [("flat.vti", "", &flat), ("empty.vti", "", &empty), ("solid.vti", "", &solid)];
+    let mut figure = figure(Source::Vti, &panels);
+    figure.cut = Cut::Plane { axis: Axis::Z, at: -0.1 };
+    figure.size = Some([1200, 500]);
+    write_state(folder.path(), &figure);
+    draw("pvbatch", &[Path::new("figure.py")], folder.path());
+    let picture = Picture::read(&folder.path().join("figure.png"));
+
+    let flat = picture.part([0.0, 1.0 / 3.0], [0.0, 1.0]);
+    let [dark, light] = [60, 204].map(|grey| flat.iter().filter(move |p| p.1 == [grey; 3]));
+    assert!(dark.clone().count() > 15_000 && light.clone().count() > 15_000, "the image is not seen");
+    assert!(dark.clone().all(|p| p.0[0] < 0.52) && light.clone().all(|p| p.0[0] > 0.48), "left is not left");
+    assert!(dark.chain(light).all(|p| p.0[1] > 0.45), "the lower half is not below");
+
+    let empty = picture.part([1.0 / 3.0, 2.0 / 3.0], [0.0, 1.0]);
+    assert!(count(&empty, |c| c == [255; 3]) > 180_000, "an empty volume is not white");
+    assert!(count(&empty, |c| c != [255; 3]) > 500, "an empty volume has its outline");
+
+    // The plane takes layers 4 to 7 away, and lays bare layer 3, dimmed by its direction.
+    let solid = picture.part([2.0 / 3.0, 1.0], [0.0, 0.7]);
+    assert!(count(&solid, |c| c[0] > 50 && c[0] < 79) > 5000, "the layer behind the plane is not laid bare");
+    let slices = picture.part([2.0 / 3.0, 7.0 / 9.0], [0.75, 0.88]);
+    assert!(count(&slices, |c| c == [77; 3]) > 3000, "the slice is not the layer at the plane");
+}
+
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn wrong_files_are_told() {
+    let folder = scratch();
+    let image = ball(true);
+    let raw = folder.path().join("a.raw");
+    write_state(folder.path(), &figure(Source::Raw, &[("a.raw", "", &image)]));
+    let complaint = || {
+        let output = run("pvbatch", &[Path::new("figure.py")], folder.path());
+        assert!(!folder.path().join("figure.png").exists());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let text = complaint();
+    assert!(text.contains("a.raw is missing: it belongs beside this state"), "{text}");
+    image.write_raw(&raw);
+    let bytes = fs::read(&raw).unwrap();
+    fs::write(&raw, &bytes[1..]).unwrap();
+    let text = complaint();
+    assert!(text.contains("a.raw has 95999 bytes, but 20 x 20 x 20 voxels of three float32 are 96000"), "{text}");
+
+    Image::new(cube(6), |_| None).write_vti(&folder.path().join("a.vti"));
+    write_state(folder.path(), &figure(Source::Vti, &[("a.vti", "", &image)]));
+    let text = complaint();
+    assert!(text.contains("a.vti has 6 x 6 x 6 voxels, but this state was written for 20 x 20 x 20"), "{text}");
+}
+
+#[test]
+#[ignore = "needs the Python environment: run tests/all"]
+fn the_text_is_sound_python() {
+    let folder = scratch();
+    let image = ball(true);
+    let caption = "it's \\ \"\u{3b1}\u{1f600}\" @SIZE@\n";
+    let mut figure = figure(Source::Vti, &[("a.vti", caption, &image)]);
+    figure.cut = Cut::Plane { axis: Axis::Y, at: 1.0 / 3.0 };
+    let path = write_state(folder.path(), &figure);
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let python = std::env::var_os("AO4D_PYTHON").map_or_else(|| here.join(".venv/bin/python"), PathBuf::from);
+    let output = Command::new(&python)
+        .arg(here.join("tests/python/check_state.py"))
+        .arg(&path)
+        .output()
+        .unwrap_or_else(|e| panic!("{} does not start: {e}; run tests/install", python.display()));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let constants: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(constants["PANELS"][0]["caption"], caption);
+    assert_eq!(constants["PANELS"][0]["dimensions"], serde_json::json!([20, 20, 20]));
+    assert_eq!(constants["CUT"], serde_json::json!(["plane", 1, 1.0 / 3.0]));
+    assert_eq!(constants["SIZE"], serde_json::json!([800, 500]));
+}
