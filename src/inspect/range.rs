@@ -81,6 +81,7 @@ impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.min, self.max, self.mean) {
             (Some(min), Some(max), Some(mean)) => write!(f, "{} to {}, mean {}", Short(min), Short(max), Short(mean))?,
+            _ if self.infinite + self.nan == 0 => f.write_str("empty")?,
             _ => f.write_str("nothing finite")?,
         }
         for (count, what) in [(self.infinite, "infinite"), (self.nan, "NaN")] {

@@ -39,7 +39,7 @@ pub use document::Document;
 pub use error::{Error, Invalid, Place, Refusal};
 pub use one_or_many::OneOrMany;
 pub use plan::Plan;
-pub use prepare::Prepared;
+pub use prepare::{Loaded, Prepared};
 pub use report::{FileReport, Report, StageTime};
 pub use run::{RunError, run};
 pub use schema::schema;

@@ -56,6 +56,10 @@ pub(super) fn shade<const D: usize>(
         let (j, k) = (row % height, layers.start + row / height);
         for (i, (fragment, &simplex)) in fragments.iter_mut().zip(visible).enumerate() {
             if simplex != NOTHING {
+                // Occlusion at the voxel itself makes a single one take long.
+                if matches!(picture.shading, Shading::Voxel(_)) && progress.cancelled() {
+                    return Err(Cancelled);
+                }
                 let number = (i + width * (j + height * k)) as u64;
                 *fragment = shade_voxel(picture, [i, j, k], number, simplex);
             }
