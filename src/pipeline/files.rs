@@ -177,7 +177,7 @@ pub(super) fn write_occlusion(
         mesh: mesh_hash.to_owned(),
         program: PROGRAM.to_owned(),
     };
-    if let OcclusionSource::Compute(Computation { method, samples, max_distance, seed }) = &occlusion.source {
+    if let OcclusionSource::Compute(Computation { method, samples, max_distance, seed, .. }) = &occlusion.source {
         sidecar.method = method.as_str().to_owned();
         sidecar.seed = *seed;
         sidecar.max_distance = max_distance.map_or(f32::INFINITY, |d| d as f32);
