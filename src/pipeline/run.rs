@@ -221,7 +221,8 @@ impl Run<'_> {
         let values = &scene.values[&index];
         let path = self.plan.out.join(file);
         let bytes = files::write_occlusion(&path, values, &self.plan.occlusions[index], self.plan.seed, &scene.hash)?;
-        self.note_written(file, bytes, &self.keys.occlusion(index).to_owned())?;
+        let key = self.keys.occlusion(index).to_owned();
+        self.note_written(file, bytes, &key)?;
         Ok(detail)
     }
 
