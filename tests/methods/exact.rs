@@ -3,7 +3,7 @@
 
 use ao4d::accel::Tracer;
 use ao4d::mesh::Incidence;
-use ao4d::occlusion::{Sampler, Settings, Site, Stream, exact};
+use ao4d::occlusion::{Sampler, Settings, Stream};
 
 use crate::scenes;
 
