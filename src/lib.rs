@@ -1,8 +1,26 @@
 //! `ao4d` turns a YAML pipeline into pictures of four-dimensional scenes with ray-traced ambient occlusion.
+//!
+//! A scene is a set of tetrahedra in R^4 (or of triangles in R^3, through the same code); a picture of it is a volume of
+//! voxels (or of pixels), which ParaView opens. Data flows one way:
+//!
+//! ```text
+//! text -> pipeline -> scene -> mesh -> accel -> occlusion -> render -> export -> files
+//! ```
+//!
+//! ```no_run
+//! use ao4d::pipeline::{Pipeline, Settings, run};
+//! use ao4d::progress::Silent;
+//!
+//! let pipeline = Pipeline::load("pipelines/two_tetrahedra.yaml".as_ref(), &[], None)?;
+//! let report = run(&pipeline, &Settings::default(), &Silent)?;
+//! println!("{report}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod accel;
 pub mod export;
 pub mod geometry;
+pub mod inspect;
 pub mod mesh;
 pub mod occlusion;
 pub mod pipeline;

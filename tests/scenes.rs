@@ -587,14 +587,82 @@ fn files_of_tetrahedra_with_positions() {
         "\"position\" has 3 components and 12 values; expected 4 components at each of 4 points",
     );
     refused("nan.vtu", vtu(&flat, &[("position", 4, position(f64::NAN))], 10, &one), "\"position\" is NaN at point 0");
-    refused("index.vtu", vtu(&flat, &[], 10, &[&[0, 1, 2, 4]]), "tetrahedron 0 names point 4 of 4");
+    refused(
+        "index.vtu",
+        vtu(&flat, &[], 10, &[&[0, 1, 2, 4]]),
+        "array `connectivity` is damaged: point 4 of 4 does not exist",
+    );
     refused("none.vtu", vtu(&flat, &[], 10, &[]), "holds no triangle");
     refused(
         "wedge.vtu",
         vtu(&flat, &[], 13, &[&[0, 1, 2, 3, 1, 2]]),
-        "cell 0 is of type Wedge; only triangles and tetrahedra are read (ParaView's Tetrahedralize makes them)",
+        "cell 0 is of type wedge; only triangles and tetrahedra are read (ParaView's Tetrahedralize makes them)",
     );
-    refused("short.vtu", vtu(&flat, &[], 10, &[&[0, 1, 2]]), "cell 0 is a Tetra of 3 points");
+    refused("short.vtu", vtu(&flat, &[], 10, &[&[0, 1, 2]]), "cell 0 is a tetrahedron of 3 points");
+}
+
+/// The same tetrahedron as ParaView saves by default, appended raw, and packed by zlib.
+#[test]
+fn files_with_appended_and_compressed_arrays() {
+    use std::io::Write;
+    let folder = Folder::new();
+    for packed in [false, true] {
+        let mut appended = Vec::new();
+        let mut place = |bytes: Vec<u8>| {
+            let offset = appended.len();
+            if packed {
+                let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), Default::default());
+                encoder.write_all(&bytes).unwrap();
+                let block = encoder.finish().unwrap();
+                // One block: how many, how long, how long the last, how long when packed.
+                for n in [1, bytes.len(), 0, block.len()] {
+                    appended.extend((n as u64).to_le_bytes());
+                }
+                appended.extend(block);
+            } else {
+                appended.extend((bytes.len() as u64).to_le_bytes());
+                appended.extend(bytes);
+            }
+            offset
+        };
+        let floats = |values: &[f64]| values.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect::<Vec<u8>>();
+        let position: Vec<f64> = ORIGIN_AND_UNITS.iter().flat_map(|[x, y, z]| [*x, *y, *z, -2.0]).collect();
+        let offsets = [
+            place(floats(&position)),
+            place(floats(ORIGIN_AND_UNITS.as_flattened())),
+            place((0..4i64).flat_map(i64::to_le_bytes).collect()),
+            place(4i64.to_le_bytes().to_vec()),
+            place(vec![10]),
+        ];
+        let array = |i: usize, kind: &str, name: &str, components: usize| {
+            format!(
+                "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{}\"/>",
+                offsets[i]
+            )
+        };
+        let compressor = if packed { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
+        let mut file = format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\"{compressor}>\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\">\n\
+             <PointData>{}</PointData>\n<Points>{}</Points>\n<Cells>{}{}{}</Cells>\n\
+             </Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_",
+            array(0, "Float32", "position", 4),
+            array(1, "Float32", "Points", 3),
+            array(2, "Int64", "connectivity", 1),
+            array(3, "Int64", "offsets", 1),
+            array(4, "UInt8", "types", 1),
+        )
+        .into_bytes();
+        file.extend(appended);
+        file.extend(b"\n</AppendedData>\n</VTKFile>\n");
+        folder.write("t.vtu", &file);
+        let surface = folder.read::<4>("t.vtu").unwrap();
+        assert_eq!(surface.simplices, [[0, 1, 2, 3]], "packed: {packed}");
+        assert_eq!(surface.vertices[1], Vector64::from([1.0, 0.0, 0.0, -2.0]));
+        folder.write("t.vtu", &file[..file.len() - 40]);
+        let cut = folder.read::<4>("t.vtu").unwrap_err();
+        assert!(cut.contains("cut short"), "{cut}");
+    }
 }
 
 #[test]

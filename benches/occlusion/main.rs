@@ -146,7 +146,8 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
                     let normal = normals[v as usize];
                     rays::directions(&table, v, &normal, &mut directions);
                     let origin = mesh.vertices[v as usize] + normal * offset;
-                    blocked += u64::from(stream.count_occluded(&tracer, &origin, &directions, f32::INFINITY, None));
+                    blocked +=
+                        u64::from(stream.count_occluded(&tracer, &origin, normal, &directions, f32::INFINITY, None));
                 }
                 1.0 - blocked as f64 / (list.len() * samples) as f64
             }));

@@ -18,10 +18,12 @@ pub struct Check {
 
 impl Check {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
-        let (pipeline, _settings) = self.options.load(console)?;
-        let counts = pipeline.prepare(|_| true)?.counts();
-        let description = pipeline.plan.describe(&counts);
-        if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;
+        let (pipelines, _settings) = self.options.load_all(console)?;
+        for pipeline in &pipelines {
+            let counts = pipeline.prepare(|_| true)?.counts();
+            let description = pipeline.plan.describe(&counts);
+            if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;
+        }
         Ok(Outcome::Done)
     }
 }

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use ao4d::inspect;
+use ao4d::volume::compare::Tolerance;
 use clap::Args;
 
 use super::console::Console;
@@ -10,7 +12,7 @@ use super::{Failure, Outcome};
 /// What `compare` takes. A value differs where |a - b| > ATOL + RTOL |b|.
 #[derive(Args, Debug)]
 pub struct Compare {
-    /// A volume (.vti), a mesh (.vtu) or an occlusion file (.f32)
+    /// A volume (.vti, .raw), a mesh (.vtu, .vtp, .stl, .ply) or an occlusion file (.f32)
     a: PathBuf,
     /// What it is compared with
     b: PathBuf,
@@ -22,7 +24,7 @@ pub struct Compare {
     rtol: f64,
     /// So many values of an array may differ
     #[arg(long, value_name = "N", default_value_t = 0)]
-    max_different: u64,
+    max_different: usize,
     /// Compare this array only; may be given several times
     #[arg(long, value_name = "NAME")]
     array: Vec<String>,
@@ -32,14 +34,14 @@ pub struct Compare {
 }
 
 impl Compare {
-    pub fn execute(self, _console: &Console) -> Result<Outcome, Failure> {
-        for file in [&self.a, &self.b] {
-            if !file.is_file() {
-                return Err(Failure::refused(format!("{}: there is no such file", file.display())));
-            }
-        }
-        let Compare { atol: _, rtol: _, max_different: _, array: _, json: _, .. } = self;
-        Err(Failure::refused("`compare` is not available in this version"))
+    pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
+        super::existing(&self.a)?;
+        super::existing(&self.b)?;
+        let Self { a, b, atol, rtol, max_different, array, json } = self;
+        let tolerance = Tolerance { atol, rtol, max_different, arrays: array };
+        let comparison = inspect::compare(&a, &b, &tolerance)?;
+        if json { console.json(&comparison) } else { console.result(&comparison.to_string()) }?;
+        Ok(if comparison.same { Outcome::Done } else { Outcome::Different })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use ao4d::inspect;
 use clap::Args;
 
 use super::console::Console;
@@ -18,11 +19,10 @@ pub struct Info {
 }
 
 impl Info {
-    pub fn execute(self, _console: &Console) -> Result<Outcome, Failure> {
-        if !self.file.is_file() {
-            return Err(Failure::refused(format!("{}: there is no such file", self.file.display())));
-        }
-        let _as_json = self.json;
-        Err(Failure::refused("`info` is not available in this version"))
+    pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
+        super::existing(&self.file)?;
+        let info = inspect::Info::read(&self.file)?;
+        if self.json { console.json(&info) } else { console.result(&info.to_string()) }?;
+        Ok(Outcome::Done)
     }
 }

@@ -14,6 +14,7 @@ mod schema;
 mod study;
 mod watch;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -54,7 +55,6 @@ pub enum Outcome {
     /// All is done.
     Done,
     /// `compare` found a difference.
-    #[allow(dead_code)] // until `compare` has something to compare with
     Different,
 }
 
@@ -65,7 +65,6 @@ pub enum Failure {
     /// The run failed.
     Failed(Box<dyn std::error::Error>),
     /// Ctrl-C.
-    #[allow(dead_code)] // until `run` has something to interrupt
     Cancelled,
 }
 
@@ -80,6 +79,17 @@ impl From<ao4d::pipeline::Error> for Failure {
     fn from(error: ao4d::pipeline::Error) -> Self {
         Failure::Refused(Box::new(error))
     }
+}
+
+impl From<ao4d::inspect::Error> for Failure {
+    fn from(error: ao4d::inspect::Error) -> Self {
+        Failure::Refused(Box::new(error))
+    }
+}
+
+/// Refuses a path where there is no file.
+fn existing(file: &Path) -> Result<(), Failure> {
+    if file.is_file() { Ok(()) } else { Err(Failure::refused(format!("{}: there is no such file", file.display()))) }
 }
 
 /// Parses the command line and does what it says.

@@ -23,9 +23,9 @@ pub struct Messages {
 /// A pipeline, and how it is run.
 #[derive(Args, Debug)]
 pub struct PipelineOptions {
-    /// The pipeline's file
-    #[arg(value_name = "PIPELINE.yaml")]
-    pub pipeline: PathBuf,
+    /// The pipeline's file, or several
+    #[arg(value_name = "PIPELINE.yaml", required = true)]
+    pub pipelines: Vec<PathBuf>,
     /// Change a value for this run: occlusion.samples=64, ID.key=..., seed=3; an empty VALUE takes the key out
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -44,8 +44,8 @@ pub struct PipelineOptions {
 }
 
 impl PipelineOptions {
-    /// Reads and checks the pipeline, and prints its warnings.
-    pub fn load(&self, console: &Console) -> Result<(Pipeline, Settings), Failure> {
+    /// Reads and checks the pipelines, and prints their warnings. One that is refused refuses them all.
+    pub fn load_all(&self, console: &Console) -> Result<(Vec<Pipeline>, Settings), Failure> {
         let settings = Settings { backend: self.backend, threads: self.threads, force: self.force };
         if let Backend::OpenCl(_) = settings.backend {
             return Err(Failure::refused(format!(
@@ -53,10 +53,32 @@ impl PipelineOptions {
                 self.backend
             )));
         }
-        let pipeline = Pipeline::load(&self.pipeline, &self.set, self.out.clone())?;
-        for warning in pipeline.warnings() {
-            console.warn(&warning);
+        if self.pipelines.len() > 1 && self.out.is_some() {
+            return Err(Failure::refused(
+                "--out names one folder, and there are several pipelines; run them one by one",
+            ));
         }
+        let load = |path: &PathBuf| Pipeline::load(path, &self.set, self.out.clone());
+        let pipelines = self.pipelines.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+        for (i, pipeline) in pipelines.iter().enumerate() {
+            if let Some(other) = pipelines[..i].iter().find(|p| p.plan.out == pipeline.plan.out) {
+                let (a, b) = (other.document.file(), pipeline.document.file());
+                return Err(Failure::refused(format!(
+                    "{a} and {b} have the same name, so one would overwrite the other"
+                )));
+            }
+            pipeline.warnings().for_each(|warning| console.warn(&warning));
+        }
+        Ok((pipelines, settings))
+    }
+
+    /// The same for a verb that takes one pipeline.
+    pub fn load(&self, console: &Console) -> Result<(Pipeline, Settings), Failure> {
+        if self.pipelines.len() > 1 {
+            return Err(Failure::refused("expected one pipeline"));
+        }
+        let (mut pipelines, settings) = self.load_all(console)?;
+        let pipeline = pipelines.pop().ok_or_else(|| Failure::refused("expected a pipeline"))?;
         Ok((pipeline, settings))
     }
 }

@@ -20,17 +20,34 @@ pub struct Run {
 
 impl Run {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
-        let (pipeline, settings) = self.options.load(console)?;
+        let (pipelines, settings) = self.options.load_all(console)?;
         let watch = Watch::new(console)?;
-        let report = run(&pipeline, &settings, &watch).map_err(|error| match error {
-            RunError::Refused(error) => Failure::Refused(Box::new(error)),
-            RunError::Cancelled(_) => Failure::Cancelled,
-            error => Failure::Failed(Box::new(error)),
-        })?;
-        for note in &report.notes {
-            console.note(&format!("note: {note}"));
+        if pipelines.len() > 1 {
+            // What is wrong with the last is found before the first is run.
+            for pipeline in &pipelines {
+                pipeline.prepare(|_| true)?;
+            }
         }
-        if self.json { console.json(&report) } else { console.result(&report.to_string()) }?;
+        let mut reports = Vec::with_capacity(pipelines.len());
+        for pipeline in &pipelines {
+            let report = run(pipeline, &settings, &watch).map_err(|error| match error {
+                RunError::Refused(error) => Failure::Refused(Box::new(error)),
+                RunError::Cancelled(_) => Failure::Cancelled,
+                error => Failure::Failed(Box::new(error)),
+            })?;
+            for note in &report.notes {
+                console.note(&format!("note: {note}"));
+            }
+            if !self.json {
+                console.result(&report.to_string())?;
+            }
+            reports.push(report);
+        }
+        match &reports[..] {
+            [one] if self.json => console.json(one)?,
+            _ if self.json => console.json(&reports)?,
+            _ => {}
+        }
         Ok(Outcome::Done)
     }
 }

@@ -76,7 +76,7 @@ impl AtomicFile {
     }
 
     /// Names the file in an error that came from a writer over it.
-    pub fn name_in(path: &Path) -> impl Fn(Error) -> Error {
+    pub fn name_in(path: &Path) -> impl Fn(Error) -> Error + use<> {
         let path = path.to_path_buf();
         move |error| match error {
             Error::Write(cause) => Error::File { path: path.clone(), action: "be written", cause },
@@ -116,6 +116,14 @@ pub fn check_free_space(path: &Path, needed: u64) -> Result<(), Error> {
         Some(free) if free < needed => Err(Error::NoSpace { path: path.into(), needed, free }),
         _ => Ok(()),
     }
+}
+
+/// Refuses beforehand a folder that files can't be put into; makes it if it isn't there.
+///
+/// # Errors
+/// If the folder can't be made or written to.
+pub fn check_writable(folder: &Path) -> Result<(), Error> {
+    AtomicFile::create(folder.join("probe")).map(drop)
 }
 
 #[cfg(test)]
@@ -160,6 +168,17 @@ mod tests {
         let error = check_free_space(Path::new("there.vti"), u64::MAX).unwrap_err().to_string();
         assert!(error.contains(&u64::MAX.to_string()), "{error}");
         check_free_space(Path::new("there.vti"), 0).unwrap();
+    }
+
+    #[test]
+    fn a_folder_is_tried_without_a_trace() {
+        let folder = tempfile::tempdir().unwrap();
+        let new = folder.path().join("a/b");
+        check_writable(&new).unwrap();
+        assert_eq!(std::fs::read_dir(&new).unwrap().count(), 0);
+        std::fs::write(new.join("file"), "").unwrap();
+        let error = check_writable(&new.join("file")).unwrap_err().to_string();
+        assert!(error.contains("a file is in the way"), "{error}");
     }
 
     #[cfg(target_os = "linux")]

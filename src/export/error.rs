@@ -18,7 +18,7 @@ pub enum Error {
     },
     /// Writing fails.
     #[error("writing failed: {}", explain(.0))]
-    Write(#[from] io::Error),
+    Write(io::Error),
     /// More bytes than the disk has left.
     #[error("{}: {needed} bytes are to be written, and the disk has {free} left; free some, or write elsewhere", path.display())]
     NoSpace {
@@ -48,21 +48,35 @@ pub enum Error {
         name: String,
     },
     /// The PNG encoder refuses.
-    #[error("writing the picture failed: {0}")]
+    #[error("writing the picture failed")]
     Png(#[from] ::png::EncodingError),
     /// The mesh writer refuses.
     #[error("writing the mesh failed: {0}")]
     Mesh(String),
 }
 
+impl From<io::Error> for Error {
+    // Not thiserror's `from`: the message has the reason already, and who prints causes as well would say it twice.
+    fn from(cause: io::Error) -> Self {
+        Error::Write(cause)
+    }
+}
+
 /// A system's reason, with a remedy where there is a plain one.
 fn explain(cause: &io::Error) -> String {
+    // Temporary files put their own names into the reason, of which nobody has heard; the kind says it in other words.
+    let wrapped = cause.get_ref().is_some() && cause.kind() != io::ErrorKind::Other;
+    let plain = io::Error::from(cause.kind());
+    let cause = if wrapped { &plain } else { cause };
     match cause.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             format!("{cause}; free some space, or write elsewhere")
         }
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             format!("{cause}; write to another folder, or change its permissions")
+        }
+        io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
+            format!("{cause}; a file is in the way, so write to another folder")
         }
         _ => cause.to_string(),
     }

@@ -15,5 +15,5 @@ pub mod vti;
 pub mod vtu;
 mod xml;
 
-pub use atomic::{AtomicFile, check_free_space, free_space};
+pub use atomic::{AtomicFile, check_free_space, check_writable, free_space};
 pub use error::Error;

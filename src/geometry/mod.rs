@@ -4,8 +4,8 @@
 //! method of the crate takes the rounded coordinates as *the* geometry; arithmetic is `f64`.
 //!
 //! What is inside, outside or on a boundary is always decided by the sign of a determinant, and that sign is
-//! exact ([`sign`]): a cheap `f64` value with a bound on its rounding error settles nearly all of them, and
-//! expansion arithmetic ([`expansion`]) the rest. So every engine that asks the same question gets the same answer.
+//! exact (`sign.rs`): a cheap `f64` value with a bound on its rounding error settles nearly all of them, and
+//! expansion arithmetic ([`Expansion`]) the rest. So every engine that asks the same question gets the same answer.
 //!
 //! Nothing here does I/O and nothing here knows of objects, images or occlusion.
 

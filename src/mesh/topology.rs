@@ -96,6 +96,55 @@ pub fn is_closed<const D: usize>(simplices: &[[u32; D]]) -> bool {
     facet_pairs(simplices).is_closed()
 }
 
+/// How many vertices, edges, triangles and, in 4D, tetrahedra there are: the f-vector. Only vertices that a simplex uses
+/// count, and they are told apart by index.
+pub fn f_vector<const D: usize>(simplices: &[[u32; D]]) -> Vec<usize> {
+    fn distinct<T: Ord>(mut faces: Vec<T>) -> usize {
+        faces.sort_unstable();
+        faces.dedup();
+        faces.len()
+    }
+    let edges = |simplex: &[u32; D]| {
+        let pairs = (0..D).flat_map(|i| (0..i).map(move |j| (i, j)));
+        pairs.map(|(i, j)| (simplex[i].min(simplex[j]), simplex[i].max(simplex[j]))).collect::<Vec<_>>()
+    };
+    let mut counts = vec![
+        distinct(simplices.as_flattened().to_vec()),
+        distinct(simplices.iter().flat_map(edges).filter(|(a, b)| a < b).collect()),
+    ];
+    if D == 4 {
+        counts.push(distinct(simplices.iter().flat_map(facets_of).map(|(facet, _)| facet).collect()));
+    }
+    counts.push(simplices.len());
+    counts
+}
+
+/// How many pieces there are that no facet connects. Bodies that touch along a facet are one piece here.
+pub fn components<const D: usize>(simplices: &[[u32; D]]) -> usize {
+    let mut facets: Vec<([u32; 3], u32)> = (simplices.iter().enumerate())
+        .flat_map(|(s, simplex)| facets_of(simplex).map(move |(facet, _)| (facet, s as u32)))
+        .collect();
+    facets.sort_unstable();
+    // A forest in which each tree is a piece; looking for its root halves the way for whoever comes after.
+    let mut parents: Vec<u32> = (0..simplices.len() as u32).collect();
+    let root = |parents: &mut [u32], mut s: u32| {
+        while parents[s as usize] != s {
+            parents[s as usize] = parents[parents[s as usize] as usize];
+            s = parents[s as usize];
+        }
+        s
+    };
+    let mut pieces = simplices.len();
+    for pair in facets.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        let (a, b) = (root(&mut parents, pair[0].1), root(&mut parents, pair[1].1));
+        if a != b {
+            parents[a.max(b) as usize] = a.min(b);
+            pieces -= 1;
+        }
+    }
+    pieces
+}
+
 /// The corners of each simplex. Indices must be within `vertices`.
 pub fn corners<const D: usize>(
     vertices: &[Vector64<D>],
@@ -189,6 +238,23 @@ mod tests {
     fn corner_simplex_is_closed_and_has_its_volume() {
         check::<3>();
         check::<4>();
+    }
+
+    #[test]
+    fn faces_and_pieces_are_counted() {
+        let (_, mut simplices) = corner_boundary::<4>();
+        assert_eq!(f_vector(&simplices), [5, 10, 10, 5]);
+        assert_eq!(f_vector(&corner_boundary::<3>().1), [4, 6, 4]);
+        assert_eq!(components(&simplices), 1);
+        // A second body, far from the first but for one vertex; then a bridge over a facet of each.
+        simplices.extend(corner_boundary::<4>().1.iter().map(|s| s.map(|v| v + 4)));
+        assert_eq!((components(&simplices), f_vector(&simplices)), (2, vec![9, 20, 20, 10]));
+        simplices.push([0, 1, 2, 100]);
+        simplices.push([5, 6, 7, 101]);
+        assert_eq!(components(&simplices), 2);
+        simplices.extend([[2, 100, 0, 5], [5, 0, 100, 6], [5, 6, 7, 100]]);
+        assert_eq!(components(&simplices), 1);
+        assert_eq!((components::<3>(&[]), f_vector::<3>(&[])), (0, vec![0, 0, 0]));
     }
 
     #[test]

@@ -3,10 +3,11 @@
 
 use std::fmt::Write;
 
+use serde::Serialize;
 use thiserror::Error;
 
 /// What stands beside an occlusion file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sidecar {
     /// Values in the file.
     pub count: usize,

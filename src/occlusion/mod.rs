@@ -45,3 +45,25 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
 pub struct Cancelled;
+
+/// Why there are no values.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The work was cancelled.
+    #[error("interrupted")]
+    Cancelled,
+    /// The closed form would have too many pieces.
+    #[error("{place}: exact occlusion is too dear here: {source}")]
+    OverBudget {
+        /// The vertex or voxel.
+        place: String,
+        /// How rich its view is.
+        source: exact::OverBudget,
+    },
+}
+
+impl From<Cancelled> for Error {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}

@@ -42,7 +42,7 @@ pub struct Sequence {
 pub(super) enum Source {
     /// Keys of the scramblings of the coordinates and of the index.
     Sobol([u32; 4]),
-    Random(ChaCha8Rng),
+    Random(Box<ChaCha8Rng>),
 }
 
 impl Sequence {
@@ -51,7 +51,7 @@ impl Sequence {
     pub fn new(sampler: Sampler, seed: u64, site: u64) -> Self {
         let mut state = mix(seed ^ mix(site.wrapping_add(0x9e37_79b9_7f4a_7c15)));
         let source = match sampler {
-            Sampler::Random => Source::Random(ChaCha8Rng::seed_from_u64(state)),
+            Sampler::Random => Source::Random(Box::new(ChaCha8Rng::seed_from_u64(state))),
             Sampler::Sobol => Source::Sobol(std::array::from_fn(|_| {
                 state = mix(state.wrapping_add(0x9e37_79b9_7f4a_7c15));
                 (state >> 32) as u32

@@ -1,7 +1,5 @@
 //! From a plan's scene to a mesh: the one place where a dimension known at run time becomes one known to the compiler.
 
-use std::path::Path;
-
 use super::Invalid;
 use super::plan::{CameraPlan, Plan, ProjectionPlan, SceneCounts, ScenePlan};
 use crate::geometry::Vector64;
@@ -67,8 +65,12 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize) -> Result<Mesh<D>, Inval
         let refuse = |key: &str, message: String| {
             Invalid::new(if key.is_empty() { here.clone() } else { format!("{here}.{key}") }, message)
         };
-        let blame = |error: scene::Error| refuse(error.key(), error.to_string());
-        let surface = build_object::<D>(object, &folder(&plan.folder)).map_err(blame)?;
+        // The path names the key already.
+        let blame = |error: scene::Error| {
+            let (key, message) = (error.key(), error.to_string());
+            refuse(key, message.strip_prefix(&format!("{key}: ")).unwrap_or(&message).to_owned())
+        };
+        let surface = build_object::<D>(object, &plan.folder).map_err(blame)?;
         let open = match object.orientation {
             scene::Orientation::Input => Orientation::Input,
             scene::Orientation::Eye => match plan.renders.iter().find(|r| r.scene == scene) {
@@ -87,9 +89,4 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize) -> Result<Mesh<D>, Inval
         builder.add(&name, color, &surface, open).map_err(|e| refuse("", e.to_string()))?;
     }
     Ok(builder.finish())
-}
-
-/// An empty path means the current folder.
-fn folder(path: &Path) -> std::path::PathBuf {
-    if path.as_os_str().is_empty() { Path::new(".").to_owned() } else { path.to_owned() }
 }

@@ -13,8 +13,10 @@ use std::time::UNIX_EPOCH;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::plan::{OcclusionSource, Plan, ScenePlan};
+use super::plan::{OcclusionSource, Plan, ScenePlan, WritePlan};
+use super::prepare::sidecar_path;
 use crate::export::{self, AtomicFile};
+use crate::scene::Orientation;
 
 /// The file's name in the output folder.
 const NAME: &str = ".ao4d-cache.json";
@@ -74,6 +76,10 @@ impl Cache {
 pub struct Keys {
     occlusions: Vec<String>,
     renders: Vec<String>,
+    /// Of each render's scene as its camera sees it, whatever the picture is like.
+    meshes: Vec<String>,
+    /// What images tell of the pipeline as a whole.
+    provenance: String,
 }
 
 impl Keys {
@@ -82,24 +88,28 @@ impl Keys {
         let program = program();
         let scenes: Vec<String> = (plan.scenes.iter().enumerate())
             .map(|(i, scene)| {
-                let first = plan.renders.iter().find(|r| r.scene == i).map(|r| &r.camera);
+                // The first camera matters to what is turned to face it, and to nothing else.
+                let faces_eye = scene.objects.iter().any(|o| o.orientation == Orientation::Eye);
+                let first = plan.renders.iter().find(|r| r.scene == i && faces_eye).map(|r| &r.camera);
                 let inputs: Vec<String> = inputs(plan, scene).iter().map(|path| content(path)).collect();
                 key(&(&program, scene.dimension, &scene.objects, first, inputs))
             })
             .collect();
         let occlusions: Vec<String> = (plan.occlusions.iter())
             .map(|occlusion| match &occlusion.source {
-                OcclusionSource::Load(file) => key(&(&scenes[occlusion.scene], content(file))),
+                OcclusionSource::Load(file) => {
+                    key(&(&scenes[occlusion.scene], content(file), content(&sidecar_path(file))))
+                }
                 OcclusionSource::Compute(computation) => key(&(&scenes[occlusion.scene], computation)),
             })
             .collect();
-        let renders = (plan.renders.iter())
-            .map(|render| {
-                let occlusion = render.occlusion.map(|o| &occlusions[o]);
-                key(&(&scenes[render.scene], occlusion, &render.camera, render.dimensions, render.shading))
-            })
+        let meshes: Vec<String> = (plan.renders.iter())
+            .map(|render| key(&(&scenes[render.scene], render.occlusion.map(|o| &occlusions[o]), &render.camera)))
             .collect();
-        Self { occlusions, renders }
+        let renders = (plan.renders.iter().zip(&meshes))
+            .map(|(render, mesh)| key(&(mesh, render.dimensions, render.shading)))
+            .collect();
+        Self { occlusions, renders, meshes, provenance: key(&(&plan.name, plan.seed)) }
     }
 
     /// The key of an occlusion file.
@@ -107,9 +117,16 @@ impl Keys {
         &self.occlusions[index]
     }
 
-    /// The key of a file of a render, of this kind, written as `how` says.
-    pub fn file(&self, render: usize, kind: &str, how: &impl Serialize) -> String {
-        key(&(&self.renders[render], kind, how))
+    /// The key of one of a write's files, by its kind.
+    pub fn file(&self, write: &WritePlan, kind: &str) -> String {
+        match kind {
+            "vti" => {
+                let how = (&write.arrays, write.encoding, write.compression);
+                key(&(&self.renders[write.render], kind, &self.provenance, how))
+            }
+            "vtu" => key(&(&self.meshes[write.render], kind)),
+            _ => key(&(&self.renders[write.render], kind)),
+        }
     }
 }
 

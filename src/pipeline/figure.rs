@@ -7,8 +7,8 @@ use super::spec::Reader;
 use super::{Axis, Cut, RunError};
 use crate::volume::Grid;
 
-/// Writes the state, if it isn't there already. Returns its length, and whether it was.
-pub(super) fn write(plan: &Plan, figure: &FigurePlan) -> Result<(u64, bool), RunError> {
+/// Writes the state, if it isn't there already or with `force`. Returns its length, and whether it was left alone.
+pub(super) fn write(plan: &Plan, figure: &FigurePlan, force: bool) -> Result<(u64, bool), RunError> {
     let with = figure.writes.iter().filter(|&&w| plan.renders[plan.writes[w].render].occlusion.is_some()).count();
     let mixed = figure.writes.len() == 2 && with == 1;
     let mut panels = Vec::with_capacity(figure.writes.len());
@@ -59,7 +59,7 @@ pub(super) fn write(plan: &Plan, figure: &FigurePlan) -> Result<(u64, bool), Run
         size: figure.size,
     });
     let path = plan.out.join(&figure.state);
-    let cached = holds(&path, state.as_bytes());
+    let cached = !force && holds(&path, state.as_bytes());
     if !cached {
         write_whole(&path, state.as_bytes())?;
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::plan::{Computation, OcclusionPlan, OcclusionSource, Plan, Samples, WritePlan};
+use super::plan::{Computation, OcclusionSource, Plan, Samples, WritePlan};
 use super::prepare::sidecar_path;
 use super::spec;
 use super::work::Stale;
@@ -25,6 +25,7 @@ pub(super) type Finished = (usize, &'static str, PathBuf, u64);
 
 /// The open files of one picture.
 pub(super) struct PictureFiles {
+    out: PathBuf,
     channels: Vec<Channel>,
     opacity: usize,
     vti: Vec<(usize, PathBuf, VtiWriter<AtomicFile>, Vec<usize>)>,
@@ -50,8 +51,10 @@ impl PictureFiles {
         for (i, write) in plan.writes.iter().enumerate().filter(|(_, w)| w.render == render) {
             if let Some(file) = write.vti.as_ref().filter(|_| stale.vti[i]) {
                 let specs: Vec<ArraySpec> = write.arrays.iter().map(|&c| array_spec(c, dimension)).collect();
-                let out = AtomicFile::create(plan.out.join(file))?;
-                let writer = VtiWriter::new(out, grid, &specs, &vti_settings(plan, write, mesh_hash))?;
+                let path = plan.out.join(file);
+                let settings = vti_settings(plan, write, mesh_hash, path.parent());
+                let out = AtomicFile::create(&path)?;
+                let writer = VtiWriter::new(out, grid, &specs, &settings).map_err(AtomicFile::name_in(&path))?;
                 vti.push((i, file.clone(), writer, write.arrays.iter().map(|&c| place(c)).collect()));
             }
             if let Some(file) = write.raw.as_ref().filter(|_| stale.raw[i]) {
@@ -63,7 +66,7 @@ impl PictureFiles {
                 slices.get_or_insert_with(|| (png::Slices::new(grid), place(Channel::Rgba)));
             }
         }
-        Ok(Self { channels, opacity: 0, vti, raw, png, slices })
+        Ok(Self { out: plan.out.clone(), channels, opacity: 0, vti, raw, png, slices })
     }
 
     /// What the files need of each slab, in this order.
@@ -73,20 +76,21 @@ impl PictureFiles {
 
     /// Writes some layers to all files; returns how many of their voxels see something.
     pub fn add_slab(&mut self, first: usize, slab: &[Array]) -> Result<u64, Error> {
+        let named = |file: &Path| AtomicFile::name_in(&self.out.join(file));
         for (_, file, writer, places) in &mut self.vti {
             for (array, &place) in places.iter().enumerate() {
-                writer.write_slab(array, first, &slab[place].values).map_err(AtomicFile::name_in(file))?;
+                writer.write_slab(array, first, &slab[place].values).map_err(named(file))?;
             }
         }
         for (_, file, writer, place) in &mut self.raw {
             if let Values::F32(rgb) = &slab[*place].values {
-                writer.write_slab(first, rgb).map_err(AtomicFile::name_in(file))?;
+                writer.write_slab(first, rgb).map_err(named(file))?;
             }
         }
-        if let Some((slices, place)) = &mut self.slices {
-            if let Values::U8(rgba) = &slab[*place].values {
-                slices.add_slab(first, rgba)?;
-            }
+        if let Some((slices, place)) = &mut self.slices
+            && let Values::U8(rgba) = &slab[*place].values
+        {
+            slices.add_slab(first, rgba)?;
         }
         Ok(match &slab[self.opacity].values {
             Values::F32(opacity) => opacity.iter().filter(|&&o| o > 0.0).count() as u64,
@@ -97,17 +101,18 @@ impl PictureFiles {
     /// Completes the files and gives them their names.
     pub fn finish(self) -> Result<Vec<Finished>, Error> {
         let mut done = Vec::new();
+        let named = |file: &Path| AtomicFile::name_in(&self.out.join(file));
         for (write, file, writer, _) in self.vti {
-            let length = writer.finish().map_err(AtomicFile::name_in(&file))?.commit()?;
+            let length = writer.finish().map_err(named(&file))?.commit()?;
             done.push((write, "vti", file, length));
         }
         for (write, file, writer, _) in self.raw {
-            let length = writer.finish().map_err(AtomicFile::name_in(&file))?.commit()?;
+            let length = writer.finish().map_err(named(&file))?.commit()?;
             done.push((write, "raw", file, length));
         }
         for (write, file, mut out) in self.png {
             if let Some((slices, _)) = &self.slices {
-                png::write(&mut out, &[slices]).map_err(AtomicFile::name_in(&file))?;
+                png::write(&mut out, &[slices]).map_err(named(&file))?;
             }
             done.push((write, "png", file, out.commit()?));
         }
@@ -125,7 +130,8 @@ fn array_spec(channel: Channel, dimension: usize) -> ArraySpec {
     ArraySpec::new(channel.name(), kind, components)
 }
 
-fn vti_settings(plan: &Plan, write: &WritePlan, mesh_hash: &str) -> vti::Settings {
+/// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
+fn vti_settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Path>) -> vti::Settings {
     let render = &plan.renders[write.render];
     let scene = &plan.scenes[render.scene];
     let occlusion = render.occlusion.map(|o| match &plan.occlusions[o].source {
@@ -155,37 +161,30 @@ fn vti_settings(plan: &Plan, write: &WritePlan, mesh_hash: &str) -> vti::Setting
             ("pipeline".to_owned(), plan.name.clone()),
             ("settings".to_owned(), settings.to_string()),
         ],
+        scratch: scratch.map(Path::to_owned),
         ..vti::Settings::default()
     }
 }
 
-/// Writes an occlusion's values and what stands beside them. Returns the length of the values' file.
-pub(super) fn write_occlusion(
-    path: &Path,
-    values: &[f32],
-    occlusion: &OcclusionPlan,
-    seed: u64,
-    mesh_hash: &str,
-) -> Result<u64, Error> {
-    let mut sidecar = Sidecar {
+/// What is known about values that were computed.
+pub(super) fn sidecar(values: &[f32], computation: &Computation, mesh_hash: &str) -> Sidecar {
+    let Computation { method, samples, max_distance, seed, .. } = computation;
+    let fixed = if let Samples::Fixed(n) = samples { Some(*n) } else { None };
+    Sidecar {
         count: values.len(),
-        method: "loaded".to_owned(),
-        samples: None,
-        seed,
-        max_distance: f32::INFINITY,
-        error_estimate: 0.0,
+        method: method.as_str().to_owned(),
+        samples: fixed.and_then(|n| u32::try_from(n).ok()),
+        seed: *seed,
+        max_distance: max_distance.map_or(f32::INFINITY, |d| d as f32),
+        // Without a sign: of no values at all it is a negative zero.
+        error_estimate: fixed.map_or(0.0, |n| occlusion::error_estimate(values, n).abs()),
         mesh: mesh_hash.to_owned(),
         program: PROGRAM.to_owned(),
-    };
-    if let OcclusionSource::Compute(Computation { method, samples, max_distance, seed }) = &occlusion.source {
-        sidecar.method = method.as_str().to_owned();
-        sidecar.seed = *seed;
-        sidecar.max_distance = max_distance.map_or(f32::INFINITY, |d| d as f32);
-        if let Samples::Fixed(n) = samples {
-            sidecar.samples = u32::try_from(*n).ok();
-            sidecar.error_estimate = occlusion::error_estimate(values, *n);
-        }
     }
+}
+
+/// Writes an occlusion's values and what stands beside them. Returns the length of the values' file.
+pub(super) fn write_occlusion(path: &Path, values: &[f32], sidecar: &Sidecar) -> Result<u64, Error> {
     // The values last: they are what others look for.
     write_whole(&sidecar_path(path), sidecar.to_yaml().as_bytes())?;
     write_whole(path, &occlusion::encode(values))

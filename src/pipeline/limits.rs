@@ -1,43 +1,73 @@
 //! What a run needs and what the computer has, told before anything is computed.
 
-use std::path::Path;
+use std::collections::BTreeSet;
 
 use super::RunError;
-use super::plan::Plan;
+use super::plan::{Plan, RenderPlan, WritePlan};
+use super::spec::{Compression, Encoding};
 use super::work::Stale;
 use crate::export;
+use crate::render::{Channel, Fragment};
 
-/// Refuses a run whose files don't fit on the disk, or one slab of whose pictures doesn't fit in memory.
+/// Refuses a run whose files don't fit on the disk, or one layer of whose pictures doesn't fit in memory.
 ///
 /// # Errors
 /// With the bytes that are needed and those that are left.
 pub(super) fn check(plan: &Plan, stale: &Stale) -> Result<(), RunError> {
-    let mut disk: u64 = 0;
-    let mut memory: u64 = 0;
-    for (i, write) in plan.writes.iter().enumerate() {
-        let render = &plan.renders[write.render];
-        let voxels = render.voxels();
-        let layer = voxels / render.dimensions[2] as u64;
-        let vti: u64 = write.arrays.iter().map(|a| a.bytes::<4>() as u64).sum();
-        if write.vti.is_some() && stale.vti[i] {
-            disk = disk.saturating_add(voxels.saturating_mul(vti));
-            memory = memory.max(layer.saturating_mul(vti + 16));
-        }
-        if write.raw.is_some() && stale.raw[i] {
-            disk = disk.saturating_add(voxels.saturating_mul(12));
-            memory = memory.max(layer.saturating_mul(12 + 16));
-        }
+    let memory = (0..plan.renders.len()).map(|render| (layer_memory(plan, stale, render), render)).max();
+    if let (Some((needed, render)), Some(available)) = (memory, available_memory())
+        && needed > available
+    {
+        return Err(RunError::Memory { render: plan.renders[render].id.clone(), needed, available });
     }
-    if let Some(available) = available_memory().filter(|&a| a < memory) {
-        return Err(RunError::Memory { needed: memory, available });
-    }
-    export::check_free_space(existing(&plan.out), disk)?;
+    let disk = (0..plan.writes.len()).map(|write| disk(plan, stale, write)).fold(0, u64::saturating_add);
+    export::check_free_space(&plan.out, disk)?;
     Ok(())
 }
 
-/// The nearest folder on the way to `path` that exists, since the disk of one that doesn't can't be asked.
-fn existing(path: &Path) -> &Path {
-    path.ancestors().find(|p| p.exists()).unwrap_or(Path::new("."))
+/// Bytes that a picture takes at once when it is made in slabs of one layer: what is seen, its shade, and the arrays
+/// of the files that have to be made.
+fn layer_memory(plan: &Plan, stale: &Stale, index: usize) -> u64 {
+    let render = &plan.renders[index];
+    let mut channels = BTreeSet::new();
+    for (w, write) in plan.writes.iter().enumerate().filter(|(_, write)| write.render == index) {
+        channels.extend(write.arrays.iter().filter(|_| stale.vti[w]));
+        channels.extend(stale.raw[w].then_some(Channel::Rgb));
+        channels.extend(stale.png[w].then_some(Channel::Rgba));
+    }
+    if channels.is_empty() {
+        return 0;
+    }
+    channels.insert(Channel::Opacity); // counts what is seen
+    let arrays: u64 = channels.iter().map(|&channel| bytes(plan, render, channel)).sum();
+    let voxel = size_of::<u32>() as u64 + size_of::<Fragment>() as u64 + arrays;
+    (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel)
+}
+
+/// Bytes that a write's large files take. How far compression gets is not known before, so compressed files count as
+/// nothing here, and are refused by the disk itself if it comes to that.
+fn disk(plan: &Plan, stale: &Stale, index: usize) -> u64 {
+    let write: &WritePlan = &plan.writes[index];
+    let render = &plan.renders[write.render];
+    let mut voxel = 0;
+    if stale.vti[index] && write.compression == Compression::None {
+        let arrays: u64 = write.arrays.iter().map(|&channel| bytes(plan, render, channel)).sum();
+        voxel += match write.encoding {
+            Encoding::Appended => arrays,
+            // Four bytes of text for three, and the arrays themselves, which are kept aside until all are whole.
+            Encoding::Inline => arrays + (4 * arrays).div_ceil(3),
+        };
+    }
+    if stale.raw[index] {
+        voxel += 12;
+    }
+    render.voxels().saturating_mul(voxel)
+}
+
+/// Bytes that a voxel takes in this array.
+fn bytes(plan: &Plan, render: &RenderPlan, channel: Channel) -> u64 {
+    let bytes = if plan.scenes[render.scene].dimension == 3 { channel.bytes::<3>() } else { channel.bytes::<4>() };
+    bytes as u64
 }
 
 /// Bytes of memory that can be had without swapping, where the system says so.

@@ -14,7 +14,16 @@ pub struct Prepared {
     /// One for each scene that was asked for.
     pub meshes: Vec<Option<AnyMesh>>,
     /// The values of each occlusion that is loaded from a file, if its scene was asked for.
-    pub loaded: Vec<Option<Vec<f32>>>,
+    pub loaded: Vec<Option<Loaded>>,
+}
+
+/// An occlusion that was computed before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// One value a vertex.
+    pub values: Vec<f32>,
+    /// What stands beside them.
+    pub sidecar: Sidecar,
 }
 
 impl Prepared {
@@ -61,7 +70,7 @@ pub(super) fn sidecar_path(file: &Path) -> PathBuf {
 }
 
 /// Reads an occlusion file for a mesh.
-fn load(file: &Path, mesh: &AnyMesh) -> Result<Vec<f32>, String> {
+fn load(file: &Path, mesh: &AnyMesh) -> Result<Loaded, String> {
     let (hash, vertices) = match mesh {
         AnyMesh::Three(m) => (m.content_hash(), m.vertices.len()),
         AnyMesh::Four(m) => (m.content_hash(), m.vertices.len()),
@@ -70,14 +79,14 @@ fn load(file: &Path, mesh: &AnyMesh) -> Result<Vec<f32>, String> {
 }
 
 /// Reads an occlusion file for the mesh with this hash and number of vertices.
-pub(super) fn read_values(file: &Path, hash: &str, vertices: usize) -> Result<Vec<f32>, String> {
+pub(super) fn read_values(file: &Path, hash: &str, vertices: usize) -> Result<Loaded, String> {
     let side = sidecar_path(file);
     let unreadable = |path: &Path, cause: std::io::Error| format!("can't read {}: {cause}", path.display());
     let text = std::fs::read_to_string(&side).map_err(|e| unreadable(&side, e))?;
     let bytes = std::fs::read(file).map_err(|e| unreadable(file, e))?;
-    let values = Sidecar::from_yaml(&text).and_then(|sidecar| {
+    let loaded = Sidecar::from_yaml(&text).and_then(|sidecar| {
         sidecar.check(hash, vertices)?;
-        occlusion::decode(&bytes, vertices)
+        Ok(Loaded { values: occlusion::decode(&bytes, vertices)?, sidecar })
     });
-    values.map_err(|e| format!("can't use {}: {e}", file.display()))
+    loaded.map_err(|e| format!("can't use {}: {e}", file.display()))
 }

@@ -12,16 +12,17 @@ use std::time::{Duration, Instant};
 use super::build::{AnyMesh, camera};
 use super::cache::{Cache, Keys};
 use super::files::{self, PictureFiles};
+use super::occlude::{self, voxel_shading};
 use super::plan::{Computation, OcclusionSource, Plan, RenderPlan, Samples, StageRef, grouped};
-use super::prepare::{Prepared, read_values};
+use super::prepare::{Loaded, Prepared, read_values, sidecar_path};
 use super::report::{FileReport, Report};
-use super::spec::{self, Method};
-use super::work::{Stale, file_key};
+use super::spec;
+use super::work::Stale;
 use super::{Error, Pipeline, Settings, figure, limits};
 use crate::accel::Tracer;
 use crate::export;
 use crate::mesh::Mesh;
-use crate::occlusion::{self, Cancelled, Sampler};
+use crate::occlusion::{self, Cancelled};
 use crate::progress::Progress;
 use crate::render::{CameraError, Picture, Shading};
 
@@ -34,25 +35,39 @@ pub enum RunError {
     /// Ctrl-C.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// There are no values of ambient occlusion.
+    #[error("ambient occlusion: {0}")]
+    Occlusion(occlusion::Error),
     /// A file can't be written.
     #[error(transparent)]
     Export(#[from] export::Error),
     /// A picture doesn't fit in memory.
     #[error(
-        "one layer of the largest picture takes {needed} bytes of memory, and {available} are free; make the picture smaller"
+        "render {render}: one layer of its picture takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays"
     )]
     Memory {
+        /// The picture.
+        render: String,
         /// Bytes that are needed at once.
         needed: u64,
         /// Bytes that are there.
         available: u64,
     },
     /// Rounding left a camera without a frame.
-    #[error("a camera can't be placed: {0}")]
+    #[error("a camera can't be placed")]
     Camera(#[from] CameraError),
     /// Threads can't be started.
-    #[error("can't start the threads: {0}")]
+    #[error("can't start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+impl From<occlusion::Error> for RunError {
+    fn from(error: occlusion::Error) -> Self {
+        match error {
+            occlusion::Error::Cancelled => Self::Cancelled(Cancelled),
+            error => Self::Occlusion(error),
+        }
+    }
 }
 
 /// Runs a pipeline and writes its files. The files are the same bytes on any number of threads.
@@ -76,6 +91,9 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     let prepared = pipeline.prepare(|scene| stale.scene(plan, scene));
     progress.end();
     let Prepared { meshes, loaded } = prepared?;
+    if stale.anything() {
+        export::check_writable(&plan.out)?;
+    }
     let building = began.elapsed();
     let report = Report { out: plan.out.clone(), ..Report::default() };
     let mut run = Run { plan, keys, cache, stale, loaded, progress, report, times: BTreeMap::new() };
@@ -88,7 +106,7 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     }
     for (i, figure) in plan.figures.iter().enumerate() {
         let start = Instant::now();
-        let (bytes, cached) = figure::write(plan, figure)?;
+        let (bytes, cached) = figure::write(plan, figure, settings.force)?;
         run.report.files.push(FileReport { path: figure.state.clone(), bytes, cached });
         run.times.insert(StageRef::Figure(i), (start.elapsed(), String::new()));
     }
@@ -107,7 +125,7 @@ struct Run<'p> {
     keys: Keys,
     cache: Cache,
     stale: Stale,
-    loaded: Vec<Option<Vec<f32>>>,
+    loaded: Vec<Option<Loaded>>,
     progress: &'p dyn Progress,
     report: Report,
     times: BTreeMap<StageRef, (Duration, String)>,
@@ -207,8 +225,15 @@ impl Run<'_> {
         let detail = self.rate(index, scene.mesh.vertices.len(), start.elapsed());
         let values = &scene.values[&index];
         let path = self.plan.out.join(file);
-        let bytes = files::write_occlusion(&path, values, &self.plan.occlusions[index], self.plan.seed, &scene.hash)?;
-        self.note_written(file, bytes, &self.keys.occlusion(index).to_owned())?;
+        let sidecar = match (&self.plan.occlusions[index].source, &self.loaded[index]) {
+            (OcclusionSource::Compute(computation), _) => files::sidecar(values, computation, &scene.hash),
+            (OcclusionSource::Load(_), Some(loaded)) => loaded.sidecar.clone(),
+            (OcclusionSource::Load(_), None) => return Ok(String::new()),
+        };
+        let bytes = files::write_occlusion(&path, values, &sidecar)?;
+        let key = self.keys.occlusion(index).to_owned();
+        self.cache.record(&sidecar_path(file), &key)?;
+        self.note_written(file, bytes, &key)?;
         Ok(detail)
     }
 
@@ -217,6 +242,9 @@ impl Run<'_> {
             OcclusionSource::Compute(Computation { samples: Samples::Fixed(samples), .. }) => {
                 let rays = *samples as f64 * vertices as f64;
                 format!("{} rays, {:.2} million a second", grouped(rays as u64), rays / time.as_secs_f64() / 1e6)
+            }
+            OcclusionSource::Compute(Computation { samples: Samples::Exact, .. }) => {
+                format!("{:.3} ms a vertex", time.as_secs_f64() * 1e3 / vertices.max(1) as f64)
             }
             _ => String::new(),
         }
@@ -229,17 +257,19 @@ impl Run<'_> {
         }
         let occlusion = &self.plan.occlusions[index];
         let values = match &occlusion.source {
-            OcclusionSource::Load(_) => self.loaded[index].take().unwrap_or_default(),
+            OcclusionSource::Load(_) => {
+                self.loaded[index].as_mut().map(|loaded| std::mem::take(&mut loaded.values)).unwrap_or_default()
+            }
             OcclusionSource::Compute(computation) => {
                 // A file that is still fresh holds the values already.
                 let kept = occlusion.file.as_deref().filter(|_| !self.stale.occlusion[index]);
                 let count = scene.mesh.vertices.len();
                 match kept.map(|f| read_values(&self.plan.out.join(f), &scene.hash, count)) {
-                    Some(Ok(values)) => values,
+                    Some(Ok(kept)) => kept.values,
                     _ => {
                         let start = Instant::now();
                         self.progress.begin(&format!("occlusion {}", occlusion.id), count as u64);
-                        let values = occlusion::at_vertices(scene.tracer(), &sampling(computation), self.progress);
+                        let values = occlude::values(scene.tracer(), computation, self.progress);
                         self.progress.end();
                         self.times.entry(StageRef::Occlusion(index)).or_default().1 =
                             self.rate(index, count, start.elapsed());
@@ -281,7 +311,7 @@ impl Run<'_> {
         self.progress.end();
         let rendering = start.elapsed();
         for (write, kind, file, bytes) in files.finish()? {
-            let key = file_key(&self.keys, &plan.writes[write], kind);
+            let key = self.keys.file(&plan.writes[write], kind);
             self.note_written(&file, bytes, &key)?;
         }
         if seen == 0 && !scene.mesh.simplices.is_empty() {
@@ -321,7 +351,7 @@ impl Run<'_> {
                 scene.mesh.simplices.len()
             ));
         }
-        let key = file_key(&self.keys, write, "vtu");
+        let key = self.keys.file(write, "vtu");
         self.note_written(file, bytes, &key)?;
         Ok(String::new())
     }
@@ -330,24 +360,10 @@ impl Run<'_> {
 /// The working set of a slab.
 const SLAB_BYTES: usize = 256 << 20;
 
-/// The settings that a computation stands for.
-fn sampling(computation: &Computation) -> occlusion::Settings {
-    let samples = match computation.samples {
-        Samples::Fixed(n) | Samples::Target { max_samples: n, .. } => n,
-        Samples::Exact => 1,
-    };
-    occlusion::Settings {
-        sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
-        samples: u32::try_from(samples).unwrap_or(u32::MAX),
-        seed: computation.seed,
-        max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
-    }
-}
-
 fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Vec<f32>>) -> Shading<'v> {
     let Some(o) = render.occlusion else { return Shading::None };
     match (render.shading, &plan.occlusions[o].source) {
-        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(sampling(computation)),
+        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => voxel_shading(computation),
         (spec::Shading::Flat, _) => Shading::Flat(&values[&o]),
         _ => Shading::Smooth(&values[&o]),
     }

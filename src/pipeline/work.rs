@@ -1,9 +1,10 @@
-//! Which files of a plan have to be made, and under which keys they will be remembered.
+//! Which files of a plan have to be made.
 
 use std::path::Path;
 
 use super::cache::{Cache, Keys};
 use super::plan::{Plan, WritePlan};
+use super::prepare::sidecar_path;
 
 /// For each write, and for each occlusion, whether its files are to be made.
 #[derive(Clone, Debug)]
@@ -15,29 +16,28 @@ pub(super) struct Stale {
     pub occlusion: Vec<bool>,
 }
 
-/// The key of one of a write's files.
-pub(super) fn file_key(keys: &Keys, write: &WritePlan, kind: &str) -> String {
-    match kind {
-        "vti" => keys.file(write.render, kind, &(&write.arrays, write.encoding, write.compression)),
-        _ => keys.file(write.render, kind, &()),
-    }
-}
-
 impl Stale {
     pub fn new(plan: &Plan, keys: &Keys, cache: &Cache) -> Self {
         let of = |kind: &str, file: fn(&WritePlan) -> Option<&Path>| -> Vec<bool> {
-            let stale = |w: &WritePlan| file(w).is_some_and(|f| !cache.is_fresh(f, &file_key(keys, w, kind)));
+            let stale = |w: &WritePlan| file(w).is_some_and(|f| !cache.is_fresh(f, &keys.file(w, kind)));
             plan.writes.iter().map(stale).collect()
         };
+        // An occlusion file is whole with what stands beside it.
+        let kept = |f: &Path, key: &str| cache.is_fresh(f, key) && cache.is_fresh(&sidecar_path(f), key);
         Self {
             vti: of("vti", |w| w.vti.as_deref()),
             raw: of("raw", |w| w.raw.as_deref()),
             png: of("png", |w| w.png.as_deref()),
             vtu: of("vtu", |w| w.vtu.as_deref()),
             occlusion: (plan.occlusions.iter().enumerate())
-                .map(|(i, o)| o.file.as_deref().is_some_and(|f| !cache.is_fresh(f, keys.occlusion(i))))
+                .map(|(i, o)| o.file.as_deref().is_some_and(|f| !kept(f, keys.occlusion(i))))
                 .collect(),
         }
+    }
+
+    /// Whether any file has to be made, figures aside.
+    pub fn anything(&self) -> bool {
+        [&self.vti, &self.raw, &self.png, &self.vtu, &self.occlusion].into_iter().flatten().any(|&stale| stale)
     }
 
     /// Whether a render has to be made for the sake of some file.

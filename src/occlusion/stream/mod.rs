@@ -72,7 +72,7 @@ impl<const D: usize> Stream<D> {
             let site = Site::at_vertex(tracer, incidence, vertex);
             return ambient_occlusion(tracer, &site, settings, u64::from(vertex));
         }
-        let question = Question::new(tracer, position, settings.max_distance, None);
+        let question = Question::new(tracer, position, normal, settings.max_distance, None);
         let source = Source::Sequence {
             sequence: Sequence::new(settings.sampler, settings.seed, u64::from(vertex)),
             frame: Frame::new(&normal),
@@ -84,11 +84,13 @@ impl<const D: usize> Stream<D> {
     }
 
     /// How many of the rays from a point in these directions, each of length 1, hit a simplex other than `ignored`
-    /// within `limit`; as [`Tracer::occluded`] tells ray by ray.
+    /// within `limit`; as [`Tracer::occluded`] tells ray by ray. If the directions are those of a hemisphere, its
+    /// middle as `normal` saves work; else it may be zero.
     pub fn count_occluded(
         &mut self,
         tracer: &Tracer<D>,
         origin: &Vector<D>,
+        normal: Vector<D>,
         directions: &[Vector<D>],
         limit: f32,
         ignored: Option<u32>,
@@ -97,7 +99,10 @@ impl<const D: usize> Stream<D> {
             let rays = directions.iter().map(|d| crate::geometry::Ray::new(*origin, *d));
             return rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
         }
-        let question = Question::new(tracer, *origin, limit, ignored);
+        // Left out only if all rays surely are on its side.
+        let on_side = directions.iter().all(|d| d.dot(&normal) > 1e-5);
+        let normal = if on_side { normal } else { Vector::zeros() };
+        let question = Question::new(tracer, *origin, normal, limit, ignored);
         self.blocked(&question, None, &[], Source::Directions(directions))
     }
 

@@ -81,6 +81,12 @@ macro_rules! arithmetic {
         }
 
         #[inline(always)]
+        fn negated_mul_add(self, factor: Self, term: Self) -> Self {
+            // SAFETY: FMA by the level.
+            Self(unsafe { _mm256_fnmadd_ps(self.0, factor.0, term.0) })
+        }
+
+        #[inline(always)]
         fn min(self, other: Self) -> Self {
             // SAFETY: AVX by the level.
             Self(unsafe { _mm256_min_ps(self.0, other.0) })

@@ -107,7 +107,12 @@ pub(super) fn array(document: &Document<'_>, node: Node<'_, '_>, tuples: Option<
     Ok(Array { name, components, values })
 }
 
+/// The array's name. The points' own array needs none: VTK finds it by its place, and some programs don't name it.
 fn name(node: Node<'_, '_>) -> Result<String, Problem> {
+    let of_points = node.parent().is_some_and(|parent| parent.has_tag_name("Points"));
+    if of_points && !node.has_attribute("Name") {
+        return Ok("Points".into());
+    }
     required(node, "Name").map(Into::into)
 }
 

@@ -32,6 +32,28 @@ pub const TRIANGLE: u8 = 5;
 /// VTK's number for a tetrahedron.
 pub const TETRAHEDRON: u8 = 10;
 
+/// What VTK calls cells of this type; the number for those that are rare.
+pub fn cell_name(kind: u8) -> String {
+    let names = [
+        "empty cell",
+        "vertex",
+        "poly-vertex",
+        "line",
+        "poly-line",
+        "triangle",
+        "triangle strip",
+        "polygon",
+        "pixel",
+        "quad",
+        "tetrahedron",
+        "voxel",
+        "hexahedron",
+        "wedge",
+        "pyramid",
+    ];
+    names.get(usize::from(kind)).map_or_else(|| format!("VTK type {kind}"), |&name| name.to_owned())
+}
+
 /// What a VTK file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DataSet {

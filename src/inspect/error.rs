@@ -1,0 +1,80 @@
+//! Why a file can't be told about or compared.
+
+use std::path::PathBuf;
+
+use crate::occlusion::FileError;
+use crate::volume;
+
+/// Something is wrong with a file, or two of them don't go together.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The operating system refuses.
+    #[error("{}: cannot be read: {cause}", path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// Its reason.
+        cause: std::io::Error,
+    },
+    /// Its name doesn't tell what it holds.
+    #[error("{}: can't tell what it holds; the name should end in .vti, .vtu, .vtp, .f32, .raw, .stl or .ply", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A VTK file that can't be taken in.
+    #[error(transparent)]
+    Vtk(#[from] volume::Error),
+    /// Another mesh that can't be taken in.
+    #[error("{}: {message}", path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// An occlusion file that isn't what its sidecar says.
+    #[error("{}: {cause}", path.display())]
+    Occlusion {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: FileError,
+    },
+    /// A length that no whole number of values has.
+    #[error("{}: holds {found} bytes, which is no multiple of {unit} above 0 ({why}); it is cut short, or something else", path.display())]
+    Length {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        found: usize,
+        /// Bytes of one value.
+        unit: usize,
+        /// Why they are so many.
+        why: &'static str,
+    },
+    /// Two files that have nothing in common.
+    #[error("{} is {first} and {} is {second}; give two of a kind", a.display(), b.display())]
+    Kinds {
+        /// The first file.
+        a: PathBuf,
+        /// What it is.
+        first: &'static str,
+        /// The second file.
+        b: PathBuf,
+        /// What it is.
+        second: &'static str,
+    },
+    /// An array that is asked for, and nowhere.
+    #[error("neither {} nor {} has an array `{name}`; there is {known}", a.display(), b.display())]
+    NoArray {
+        /// The array.
+        name: String,
+        /// The first file.
+        a: PathBuf,
+        /// The second file.
+        b: PathBuf,
+        /// The arrays that there are.
+        known: String,
+    },
+}

@@ -1,0 +1,166 @@
+//! What a file holds, and how far two files are apart: `ao4d info` and `ao4d compare`.
+//!
+//! [`Contents::read`] takes in every kind of file that this program reads or writes. VTK's files tell by themselves what
+//! they hold; the others have nothing but their names to go by:
+//!
+//! | file | read as |
+//! | --- | --- |
+//! | `.vti`, `.vtu`, `.vtp` | an image or a mesh, as [`crate::volume::vtk`] reads it |
+//! | `.stl`, `.ply` | a mesh of triangles, as a scene would take it |
+//! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
+//! | `.raw` | colours without a header: only how many |
+//!
+//! From there [`compare()`] goes number by number, and [`Info`] describes: ranges of arrays, and of a simplicial mesh
+//! whether it is closed, oriented and welded ([`surface`]).
+
+mod error;
+mod info;
+mod range;
+pub mod surface;
+
+use std::path::Path;
+
+pub use error::Error;
+pub use info::{Description, Info};
+pub use range::{ArraySummary, Range};
+
+use crate::occlusion::{self, Sidecar};
+use crate::scene;
+use crate::scene::readers::{Cells, FileMesh, Input};
+use crate::volume::compare::{self, Comparison, Tolerance};
+use crate::volume::vtk::{self, DataSet, Image, TETRAHEDRON, TRIANGLE, UnstructuredGrid};
+use crate::volume::{Array, Kind, Values};
+
+/// What values at vertices are called, here as in the files of meshes.
+const OCCLUSION: &str = "ambient_occlusion";
+/// What the colours of a `.raw` file are called, as in images.
+const COLOURS: &str = "rgb";
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Contents {
+    /// An image.
+    Image(Image),
+    /// Points and cells.
+    Mesh(UnstructuredGrid),
+    /// One value a vertex, and what is known about them.
+    Occlusion(Values, Option<Sidecar>),
+    /// Red, green and blue of each voxel, of an image whose dimensions are told elsewhere.
+    Raw(Values),
+}
+
+impl Contents {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// If it can't be read, is damaged, cut short, or of a kind that isn't known here.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        match ending.as_str() {
+            "f32" => occlusion_file(path),
+            "raw" => numbers(path, 12, "colours are three floats of four bytes each").map(Self::Raw),
+            "stl" | "ply" => triangles(path).map(Self::Mesh),
+            "vti" | "vtu" | "vtp" | "vtk" | "xml" => Ok(match vtk::read(path)? {
+                DataSet::Image(image) => Self::Image(image),
+                DataSet::Unstructured(mesh) => Self::Mesh(mesh),
+            }),
+            _ => Err(Error::Unknown { path: path.into() }),
+        }
+    }
+
+    /// What kind of thing it is, with its article.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Image(_) => "an image",
+            Self::Mesh(_) => "a mesh",
+            Self::Occlusion(..) => "an occlusion file",
+            Self::Raw(_) => "a raw file",
+        }
+    }
+
+    /// The names of its arrays, as [`compare()`] takes them.
+    pub fn array_names(&self) -> Vec<&str> {
+        fn names(arrays: &[Array]) -> Vec<&str> {
+            arrays.iter().map(|a| a.name.as_str()).collect()
+        }
+        match self {
+            Self::Image(image) => [names(&image.point_arrays), names(&image.cell_arrays)].concat(),
+            Self::Mesh(mesh) => [vec!["points"], names(&mesh.point_arrays), names(&mesh.cell_arrays)].concat(),
+            Self::Occlusion(..) => vec![OCCLUSION],
+            Self::Raw(_) => vec![COLOURS],
+        }
+    }
+}
+
+/// Compares two files, number by number.
+///
+/// # Errors
+/// If one can't be read, if they hold different kinds of things, or if neither has an array that is asked for.
+pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, Error> {
+    let (first, second) = (Contents::read(a)?, Contents::read(b)?);
+    let mut known = first.array_names();
+    known.extend(second.array_names().into_iter().filter(|name| !first.array_names().contains(name)));
+    if let Some(name) = tolerance.arrays.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(Error::NoArray { name: name.clone(), a: a.into(), b: b.into(), known: known.join(", ") });
+    }
+    Ok(match (&first, &second) {
+        (Contents::Image(x), Contents::Image(y)) => compare::images(x, y, tolerance),
+        (Contents::Mesh(x), Contents::Mesh(y)) => compare::meshes(x, y, tolerance),
+        (Contents::Occlusion(x, _), Contents::Occlusion(y, _)) => compare::lists(OCCLUSION, x, y, tolerance),
+        (Contents::Raw(x), Contents::Raw(y)) => compare::lists(COLOURS, x, y, tolerance),
+        _ => {
+            return Err(Error::Kinds { a: a.into(), first: first.kind(), b: b.into(), second: second.kind() });
+        }
+    })
+}
+
+/// All floats of a file whose length is a multiple of `unit` bytes.
+fn numbers(path: &Path, unit: usize, why: &'static str) -> Result<Values, Error> {
+    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    if bytes.is_empty() || bytes.len() % unit != 0 {
+        return Err(Error::Length { path: path.into(), found: bytes.len(), unit, why });
+    }
+    Ok(Kind::F32.decode(&bytes, true))
+}
+
+/// With a sidecar the file must be what that says; without one it is a list of floats, whatever they are.
+fn occlusion_file(path: &Path) -> Result<Contents, Error> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".yaml");
+    let beside = Path::new(&beside);
+    if !beside.exists() {
+        return Ok(Contents::Occlusion(numbers(path, 4, "values are floats of four bytes each")?, None));
+    }
+    let text = std::fs::read_to_string(beside).map_err(|cause| Error::Open { path: beside.into(), cause })?;
+    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let damaged = |cause| Error::Occlusion { path: path.into(), cause };
+    let sidecar = Sidecar::from_yaml(&text).map_err(damaged)?;
+    let values = occlusion::decode(&bytes, sidecar.count).map_err(damaged)?;
+    Ok(Contents::Occlusion(values.into(), Some(sidecar)))
+}
+
+/// A mesh from a file that isn't VTK's.
+fn triangles(path: &Path) -> Result<UnstructuredGrid, Error> {
+    let mesh = Input::new("", Path::new(""), path).read().map_err(|error| match error {
+        scene::Error::Unreadable { path, source, .. } => Error::Open { path, cause: source },
+        scene::Error::Content { path, message, .. } => Error::Mesh { path, message },
+        scene::Error::Invalid { message, .. } => Error::Mesh { path: path.into(), message },
+    })?;
+    Ok(grid(mesh))
+}
+
+fn grid(FileMesh { points, cells, point_arrays }: FileMesh) -> UnstructuredGrid {
+    let (connectivity, size, kind) = match cells {
+        Cells::Triangles(cells) => (cells.into_flattened(), 3, TRIANGLE),
+        Cells::Tetrahedra(cells) => (cells.into_flattened(), 4, TETRAHEDRON),
+    };
+    let count = connectivity.len() / size;
+    UnstructuredGrid {
+        points: points.into_iter().map(Into::into).collect(),
+        connectivity,
+        offsets: (1..=count).map(|i| i * size).collect(),
+        types: vec![kind; count],
+        point_arrays: point_arrays.into_iter().map(|a| Array::new(a.name, a.components, a.values)).collect(),
+        ..UnstructuredGrid::default()
+    }
+}

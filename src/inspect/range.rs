@@ -1,0 +1,139 @@
+//! What can be said about an array in a line: its type, and for each component the smallest, largest and mean number.
+//!
+//! Infinities and NaNs are counted and left out of the rest, since one of them would hide all that is there besides:
+//! the depth of a picture is infinite wherever nothing is seen.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::volume::{Array, Kind};
+
+/// An array, summarised.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArraySummary {
+    /// Its name.
+    pub name: String,
+    /// The type of its numbers.
+    #[serde(rename = "type")]
+    pub kind: Kind,
+    /// Numbers a tuple.
+    pub components: usize,
+    /// How many tuples there are.
+    pub tuples: usize,
+    /// Of each component.
+    pub ranges: Vec<Range>,
+}
+
+/// What the numbers of one component are like.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Range {
+    /// The smallest finite number, if there is one.
+    pub min: Option<f64>,
+    /// The largest finite number, if there is one.
+    pub max: Option<f64>,
+    /// The mean of all finite numbers, if there are any.
+    pub mean: Option<f64>,
+    /// How many are infinite.
+    pub infinite: usize,
+    /// How many are no numbers.
+    pub nan: usize,
+}
+
+impl Range {
+    /// Of these numbers.
+    pub fn of(numbers: impl Iterator<Item = f64>) -> Self {
+        let mut range = Self::default();
+        let (mut sum, mut count) = (0.0, 0usize);
+        for x in numbers {
+            if x.is_nan() {
+                range.nan += 1;
+            } else if x.is_infinite() {
+                range.infinite += 1;
+            } else {
+                range.min = Some(range.min.map_or(x, |m: f64| m.min(x)));
+                range.max = Some(range.max.map_or(x, |m: f64| m.max(x)));
+                sum += x;
+                count += 1;
+            }
+        }
+        range.mean = (count > 0).then(|| sum / count as f64);
+        range
+    }
+}
+
+impl ArraySummary {
+    /// Of this array.
+    pub fn of(array: &Array) -> Self {
+        let (components, count) = (array.components.max(1), array.values.len());
+        let component = |c: usize| Range::of((c..count).step_by(components).map(|i| array.values.get(i)));
+        Self {
+            name: array.name.clone(),
+            kind: array.values.kind(),
+            components,
+            tuples: array.tuples(),
+            ranges: (0..components).map(component).collect(),
+        }
+    }
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.min, self.max, self.mean) {
+            (Some(min), Some(max), Some(mean)) => write!(f, "{} to {}, mean {}", Short(min), Short(max), Short(mean))?,
+            _ if self.infinite + self.nan == 0 => f.write_str("empty")?,
+            _ => f.write_str("nothing finite")?,
+        }
+        for (count, what) in [(self.infinite, "infinite"), (self.nan, "NaN")] {
+            if count > 0 {
+                write!(f, ", {count} {what}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for ArraySummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, {} x {}: ", self.name, self.components, self.kind.vtk_name())?;
+        for (i, range) in self.ranges.iter().enumerate() {
+            write!(f, "{}{range}", if i > 0 { "; " } else { "" })?;
+        }
+        Ok(())
+    }
+}
+
+/// A number in six digits at most; whole ones and round ones in fewer.
+pub(super) struct Short(pub f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let x = self.0;
+        let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+        if x == 0.0 || (1e-4..1e9).contains(&x.abs()) { write!(f, "{rounded}") } else { write!(f, "{rounded:e}") }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_finite_is_counted_and_left_out() {
+        let (inf, nan) = (f32::INFINITY, f32::NAN);
+        let array = Array::new("a", 2, vec![1.0f32, inf, 3.0, -inf, nan, nan]);
+        let summary = ArraySummary::of(&array);
+        assert_eq!(summary.tuples, 3);
+        assert_eq!(summary.ranges[0], Range { min: Some(1.0), max: Some(3.0), mean: Some(2.0), infinite: 0, nan: 1 });
+        assert_eq!(summary.ranges[1], Range { infinite: 2, nan: 1, ..Range::default() });
+        assert_eq!(summary.to_string(), "a, 2 x Float32: 1 to 3, mean 2, 1 NaN; nothing finite, 2 infinite, 1 NaN");
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        for (x, text) in [(0.1f32 as f64, "0.1"), (255.0, "255"), (-1.0 / 3.0, "-0.333333"), (1e-7, "1e-7"), (0.0, "0")]
+        {
+            assert_eq!(Short(x).to_string(), text);
+        }
+    }
+}

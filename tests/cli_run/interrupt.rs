@@ -1,0 +1,53 @@
+//! Ctrl-C.
+#![cfg(unix)]
+
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::{FILES, Folder, PIPELINE, names};
+
+/// Waits until a run has ended; it is stopped after a while, so that no test waits for ever.
+fn wait(child: &mut Child, limit: Duration) -> Option<i32> {
+    let began = Instant::now();
+    while began.elapsed() < limit {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    None
+}
+
+/// Ctrl-C in the middle of each kind of work. A debug build looks for it as often, but works slowly in between.
+#[test]
+fn interrupted_runs_leave_nothing_behind() {
+    let limit = Duration::from_secs(if cfg!(debug_assertions) { 60 } else { 2 });
+    let sphere = "hypersphere: {radius: 0.5, subdivisions: 12}";
+    let body = "tesseract: {size: 0.5}";
+    for (what, shape, sets) in [
+        ("occlusion", sphere, &["ao.samples=16384"][..]),
+        ("picture", body, &["image.dimensions=[400, 400, 400]", "plain.dimensions=[400, 400, 400]", "ao.samples=1"]),
+        ("voxel", body, &["image.shading=voxel", "image.dimensions=[400, 8, 8]", "ao.samples=10000"]),
+    ] {
+        let folder = Folder::with(&PIPELINE.replace(body, shape));
+        let arguments: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        let mut child = folder.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs(1));
+        assert!(child.try_wait().unwrap().is_none(), "{what}: ended too early to be interrupted");
+        let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(signal.success());
+        let sent = Instant::now();
+        assert_eq!(wait(&mut child, Duration::from_secs(120)), Some(130), "{what}");
+        assert!(sent.elapsed() < limit, "{what}: {:?}", sent.elapsed());
+        let output = child.wait_with_output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((told.as_str(), output.stdout.len()), ("interrupted\n", 0), "{what}");
+        let out = folder.path("out/small");
+        let left = if out.exists() { names(&out) } else { Vec::new() };
+        assert!(left.iter().all(|name| FILES.contains(&name.as_str())), "{what}: {left:?}");
+        assert!(!left.contains(&"image.vti".to_owned()), "{what}: {left:?}");
+        assert_eq!(left.contains(&"ao.f32".to_owned()), left.contains(&"ao.f32.yaml".to_owned()), "{what}: {left:?}");
+    }
+}

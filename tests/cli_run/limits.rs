@@ -1,0 +1,96 @@
+//! Disks that are too small, too little memory, folders that can't be written to.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::{FILES, Folder, contents, names};
+
+#[test]
+fn what_cannot_fit_is_told_before_anything_is_computed() {
+    let folder = Folder::new();
+    let began = Instant::now();
+    // 12 bytes a voxel in each of two files, and the other picture's 12.
+    let large = ["--set", "image.dimensions=[4000, 4000, 65535]", "--set", "ao.samples=16777216"];
+    let bytes = 4000 * 4000 * 65_535 * 24 + 7 * 6 * 5 * 12u64;
+    let told = format!("out/small: {bytes} bytes are to be written, and the disk has ");
+    folder.fails(&large, 3, &[&told, "elsewhere"]);
+    // One layer: a simplex's number, its shade, rgba, opacity, ambient occlusion and rgb for each voxel.
+    let deep = ["--set", "image.dimensions=[65535, 65535, 1]", "--set", "ao.samples=16777216"];
+    let bytes = 65_535u64 * 65_535 * (4 + 12 + 4 + 4 + 4 + 12);
+    let told = format!("render image: one layer of its picture takes {bytes} bytes of memory, and ");
+    folder.fails(&deep, 3, &[&told]);
+    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+}
+
+#[cfg(unix)]
+#[test]
+fn folders_that_cannot_be_written_to() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("file"), "").unwrap();
+    // Told before 16 million rays a vertex are traced.
+    for (out, place) in [("file", "file"), ("file/inside", "file/inside")] {
+        folder.fails(&["--out", out, "--set", "ao.samples=16777216"], 3, &[place, "cannot make the folder"]);
+    }
+    assert_eq!(names(folder.0.path()), ["file", "p.yaml"]);
+    // A folder where a file should be.
+    std::fs::create_dir_all(folder.path("taken/image.vti")).unwrap();
+    folder.fails(&["--out", "taken"], 3, &["taken/image.vti", "cannot be written"]);
+    assert!(!names(&folder.path("taken")).iter().any(|name| name.ends_with(".partial")));
+}
+
+/// A disk of a few kilobytes, where one can be had.
+#[cfg(target_os = "linux")]
+struct TinyDisk(PathBuf);
+
+#[cfg(target_os = "linux")]
+impl TinyDisk {
+    fn mount(at: PathBuf, kilobytes: u32) -> Option<Self> {
+        std::fs::create_dir(&at).unwrap();
+        let size = format!("size={kilobytes}k");
+        let mut mount = Command::new("mount");
+        let mounted = mount.args(["-t", "tmpfs", "-o", &size, "tmpfs"]).arg(&at).stderr(Stdio::null()).status();
+        mounted.is_ok_and(|status| status.success()).then_some(Self(at))
+    }
+}
+
+#[cfg(target_os = "linux")]
+impl Drop for TinyDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+/// Needs the right to mount; without it, `/dev/full` tells the same story of the files' writer in its own tests.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up() {
+    let folder = Folder::new();
+    let mut whole = Vec::new();
+    folder.runs(&["--out", "reference"]);
+    let reference = contents(&folder.path("reference"));
+    // The compressed file is not counted beforehand, so the disk itself has to refuse, at one place or another.
+    for kilobytes in (4..72).step_by(8) {
+        let Some(disk) = TinyDisk::mount(folder.path(&format!("disk{kilobytes}")), kilobytes) else {
+            eprintln!("this user can't mount; nothing tested");
+            return;
+        };
+        let out = disk.0.join("out");
+        let output = folder.run(&["--out", out.to_str().unwrap()]);
+        let told = String::from_utf8(output.stderr).unwrap();
+        let found = if out.exists() { contents(&out) } else { BTreeMap::new() };
+        whole.push(found.len());
+        for (name, bytes) in &found {
+            assert!(!name.ends_with(".partial"), "{kilobytes} kB: {name} is left");
+            assert!(*bytes == reference[name], "{kilobytes} kB: {name} is not whole");
+        }
+        if found.len() < FILES.len() {
+            assert_eq!(output.status.code(), Some(3), "{kilobytes} kB: {told}");
+            assert_eq!(told.matches("error: ").count(), 1, "{told}");
+            assert!(told.contains("free some") && told.contains(&*out.to_string_lossy()), "{told}");
+        }
+    }
+    assert!(whole[0] < FILES.len() && whole.last() == Some(&FILES.len()), "{whole:?}");
+    assert!(whole.windows(2).all(|pair| pair[0] <= pair[1]), "{whole:?}");
+}

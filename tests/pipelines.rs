@@ -1,0 +1,128 @@
+//! Every pipeline of the repository is run, and what it promises is held against what it leaves.
+
+use std::path::{Path, PathBuf};
+
+use ao4d::pipeline::{Pipeline, Report, Settings, run};
+use ao4d::progress::Silent;
+use ao4d::volume;
+
+/// All `.yaml` files below `pipelines/`.
+fn pipelines() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "yaml") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn run_into(path: &Path, out: &Path, overrides: &[&str]) -> Report {
+    let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
+    let pipeline = Pipeline::load(path, &overrides, Some(out.to_owned())).unwrap();
+    assert_eq!(pipeline.warnings().count(), 0);
+    run(&pipeline, &Settings::default(), &Silent).unwrap()
+}
+
+#[test]
+fn every_pipeline_leaves_what_it_promises() {
+    let pipelines = pipelines();
+    assert!(pipelines.len() >= 10, "{pipelines:?}");
+    for path in pipelines {
+        let folder = tempfile::tempdir().unwrap();
+        let pipeline = Pipeline::load(&path, &[], Some(folder.path().to_owned())).unwrap();
+        let report = run(&pipeline, &Settings::default(), &Silent).unwrap();
+        assert_eq!(report.notes, Vec::<String>::new(), "{}", path.display());
+        println!("{}: {:.2} s", path.display(), report.seconds);
+        for write in &pipeline.plan.writes {
+            let render = &pipeline.plan.renders[write.render];
+            let voxels = render.voxels() as usize;
+            if let Some(file) = &write.vti {
+                let image = volume::read(&folder.path().join(file)).unwrap();
+                assert_eq!(image.grid.dimensions, render.dimensions);
+                let names: Vec<&str> = image.arrays.iter().map(|a| a.name.as_str()).collect();
+                let expected: Vec<&str> = write.arrays.iter().map(|a| a.name()).collect();
+                assert_eq!(names, expected);
+                // Something is seen and something isn't; and where there is occlusion, there are many greys: the
+                // thesis's all or nothing would be two.
+                let opacity = image.array("opacity").unwrap().values.to_f64();
+                let seen = opacity.iter().filter(|&&o| o == 1.0).count();
+                assert!(seen * 200 > voxels && seen < voxels, "{}: {seen} of {voxels}", path.display());
+                let mut greys = image.array("ambient_occlusion").unwrap().values.to_f64();
+                greys.sort_by(f64::total_cmp);
+                greys.dedup();
+                let enough = if render.occlusion.is_none() { 1 } else { 3 };
+                assert!(greys.len() >= enough && (greys.len() == 1) == render.occlusion.is_none());
+            }
+            if let Some(file) = &write.raw {
+                assert_eq!(std::fs::metadata(folder.path().join(file)).unwrap().len(), 12 * voxels as u64);
+            }
+        }
+        let screenshots: Vec<_> = pipeline.plan.figures.iter().filter_map(|f| f.screenshot.as_ref()).collect();
+        for file in pipeline.plan.files() {
+            // ParaView makes the screenshot, not the run.
+            assert_eq!(folder.path().join(file).is_file(), !screenshots.contains(&file), "{}", file.display());
+        }
+    }
+}
+
+fn values(out: &Path) -> Vec<f32> {
+    let bytes = std::fs::read(out.join("ao.f32")).unwrap();
+    ao4d::occlusion::decode(&bytes, bytes.len() / 4).unwrap()
+}
+
+/// Whether each value of a group is below each of the next by at least `gap`.
+fn ordered(values: &[f32], groups: &[&[usize]], gap: f32) -> bool {
+    groups.windows(2).all(|pair| {
+        let darkest = pair[1].iter().map(|&i| values[i]).fold(1.0, f32::min);
+        pair[0].iter().all(|&i| values[i] + gap <= darkest)
+    })
+}
+
+#[test]
+fn two_tetrahedra_have_the_order_that_the_thesis_expects() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["two_tetrahedra", "thesis/fig_5_1", "thesis/fig_5_2", "thesis/fig_5_7"] {
+        let path = format!("{}/pipelines/{name}.yaml", env!("CARGO_MANIFEST_DIR"));
+        let out = folder.path().join(name);
+        run_into(Path::new(&path), &out, &[]);
+        let values = values(&out);
+        // Fig. 5.7: occlusion highest at 1, 2, 3, lowest at 4, 5, 7, in between at 0 and 6.
+        assert!(ordered(&values, &[&[1, 2, 3], &[0, 6], &[4, 5, 7]], 0.02), "{values:?}");
+    }
+}
+
+#[test]
+fn two_structures_have_the_order_that_the_thesis_expects() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["thesis/fig_5_3", "thesis/fig_5_9"] {
+        let path = format!("{}/pipelines/{name}.yaml", env!("CARGO_MANIFEST_DIR"));
+        let out = folder.path().join(name);
+        run_into(Path::new(&path), &out, &[]);
+        let values = values(&out);
+        assert_eq!(values.len(), 14);
+        // Fig. 5.9: occlusion highest at 1, 3, 8 and 10; the right structure mirrors the left.
+        assert!(ordered(&values, &[&[1, 3, 8, 10], &[0, 2, 4, 5, 6, 7, 9, 11, 12, 13]], 0.015), "{values:?}");
+        assert!((0..7).all(|i| (values[i] - values[i + 7]).abs() < 0.01), "{values:?}");
+    }
+}
+
+#[test]
+fn cut_cubes_are_darkest_in_the_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = format!("{}/pipelines/thesis/fig_5_4.yaml", env!("CARGO_MANIFEST_DIR"));
+    run_into(Path::new(&path), folder.path(), &[]);
+    let values = values(folder.path());
+    let darkest = values.iter().copied().fold(1.0, f32::min);
+    // Neither all nor nothing: many greys between a dark groove and open outer faces.
+    let between = values.iter().filter(|&&v| v > darkest + 0.05 && v < 0.95).count();
+    assert!(darkest < 0.4 && values.iter().filter(|&&v| v > 0.99).count() * 4 > values.len());
+    assert!(between * 5 > values.len(), "{between} of {}", values.len());
+}
