@@ -13,6 +13,7 @@
 //!   convex surroundings block nothing; a concave fold blocks the same, be the surface open or closed;
 //! - a visible point inside a simplex ignores that simplex.
 
+mod as_published;
 pub mod exact;
 mod file;
 mod sampling;
@@ -20,6 +21,7 @@ mod site;
 mod stream;
 mod vertices;
 
+pub use as_published::{Slips, as_published};
 pub use file::{FileError, Sidecar, decode, encode};
 pub use sampling::{Sampler, Sequence, cube_to_ball, square_to_disk};
 pub use site::Site;
