@@ -36,6 +36,9 @@ struct Options {
     embree: bool,
 }
 
+/// How long each timing takes at least.
+const SECONDS: f64 = 0.2;
+
 /// One timing: millions of rays per second, and the mean value.
 #[derive(Clone, Copy, Default)]
 struct Timing {
@@ -53,11 +56,11 @@ fn median(mut timings: Vec<Timing>) -> Timing {
     timings[timings.len() / 2]
 }
 
-/// Repeats a pass over the vertices for at least 0.3 s.
+/// Repeats a pass over the vertices for at least [`SECONDS`].
 fn time(vertices: usize, samples: usize, mut pass: impl FnMut() -> f64) -> Timing {
     let start = thread_seconds();
     let (mut passes, mut mean) = (0, 0.0);
-    while passes == 0 || thread_seconds() - start < 0.3 {
+    while passes == 0 || thread_seconds() - start < SECONDS {
         mean = pass();
         passes += 1;
     }

@@ -46,6 +46,10 @@ pub struct Leaf<const D: usize> {
     pub corners: [[[f32; WIDTH]; D]; D],
     /// Which simplices of the mesh these are; [`Leaf::UNUSED`] where there are fewer.
     pub simplices: [u32; WIDTH],
+    /// The middle of the corners, scaled, and a bound on the 1-norm of what leads from there to a corner.
+    pub middle: [f32; D],
+    /// See `middle`.
+    pub reach: f32,
 }
 
 impl<const D: usize> Leaf<D> {
@@ -218,7 +222,12 @@ impl<const D: usize> WideNode<D> {
 
 impl<const D: usize> Leaf<D> {
     fn new(simplices: &[u32], mesh: &Mesh<D>, scale: &Scale<D>) -> Self {
-        let mut leaf = Self { corners: [[[0.0; WIDTH]; D]; D], simplices: [Self::UNUSED; WIDTH] };
+        let bounds =
+            Aabb::of(simplices.iter().flat_map(|&s| mesh.simplices[s as usize]).map(|v| &mesh.vertices[v as usize]));
+        let (low, high) = (scale.scaled(&bounds.min), scale.scaled(&bounds.max));
+        let middle: [f32; D] = std::array::from_fn(|k| 0.5 * (low[k] + high[k]));
+        let reach = (0..D).map(|k| (middle[k] - low[k]).max(high[k] - middle[k])).sum::<f32>() * (1.0 + 1e-5);
+        let mut leaf = Self { corners: [[[0.0; WIDTH]; D]; D], simplices: [Self::UNUSED; WIDTH], middle, reach };
         for lane in 0..WIDTH {
             // Unused lanes repeat the last simplex, so that their numbers are harmless.
             let simplex = simplices[lane.min(simplices.len() - 1)];

@@ -37,7 +37,7 @@ pub(super) struct Cones<const D: usize> {
     pub trusted: u8,
 }
 
-/// What the filter says of a direction.
+/// What the filter says of a direction and eight cones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Verdict {
     /// Cones that hold it.
@@ -185,6 +185,27 @@ impl<const D: usize> Cones<D> {
         let inside = candidates & self.trusted & !margin.less_or_equal(L::splat(0.0));
         Verdict { inside, doubtful: candidates & !inside }
     }
+}
+
+/// Whether the cones of these vectors hold a direction, the same in all lanes; for one direction this is less work than
+/// making [`Cones`]. `size` is a bound on the 1-norms of the vectors. Cones with a zero vector may be doubtful.
+#[inline(always)]
+pub(super) fn judge_once<L: Lanes, const D: usize>(edges: &[[L; D]; D], direction: &[L; D], size: f32) -> Verdict {
+    let normals = facet_normals(edges);
+    let determinant = dot(&normals[0], &edges[0]);
+    let value = dot(&normals[0], direction).turned_by(determinant);
+    let (mut least, mut greatest) = (value, value);
+    for normal in &normals[1..] {
+        let value = dot(normal, direction).turned_by(determinant);
+        least = least.min(value);
+        greatest = greatest.max(value);
+    }
+    let bound = ROUNDING * if D == 3 { size * size } else { size * size * size } + UNDERFLOW;
+    let unoriented = determinant.abs().less_or_equal(L::splat(bound * size + UNDERFLOW));
+    let outside = least.less_or_equal(L::splat(-bound));
+    let inside = !least.less_or_equal(L::splat(bound)) & !unoriented;
+    let turned_inside = unoriented & greatest.less_or_equal(L::splat(bound));
+    Verdict { inside, doubtful: (!outside | turned_inside) & !inside }
 }
 
 #[inline(always)]

@@ -13,6 +13,17 @@ use crate::geometry::{Frame, Vector};
 /// Rays of a block; the bits of a `u64` name them.
 pub(super) const BLOCK: usize = 64;
 
+/// Groups of rays as wide as the lanes.
+pub(super) const GROUPS: usize = BLOCK / WIDTH;
+
+/// A cone that holds the directions of a group: its axis, and the cosine and sine of its half-angle, at most a right angle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GroupCone<const D: usize> {
+    pub axis: [f32; D],
+    pub cosine: f32,
+    pub sine: f32,
+}
+
 /// The first Sobol' points, each coordinate with its bits reversed.
 static SOBOL_BLOCK: [[u32; BLOCK]; 3] = sobol_block();
 
@@ -45,6 +56,8 @@ pub(super) struct Rays<const D: usize> {
     pub offset: [[f32; BLOCK]; D],
     /// The cosine to the normal.
     pub height: [f32; BLOCK],
+    /// Around the directions of each group.
+    pub cones: [GroupCone<D>; GROUPS],
 }
 
 impl<const D: usize> Rays<D> {
@@ -55,6 +68,7 @@ impl<const D: usize> Rays<D> {
             absolute: [[0.0; BLOCK]; D],
             offset: [[0.0; BLOCK]; D],
             height: [0.0; BLOCK],
+            cones: [GroupCone { axis: [0.0; D], cosine: 0.0, sine: 1.0 }; GROUPS],
         }
     }
 
@@ -152,6 +166,7 @@ impl<const D: usize> Rays<D> {
                 self.offset[k][i] = origin[k] * inverse;
             }
         }
+        self.enclose();
     }
 
     /// The rays whose cosine to the normal is at most this.
@@ -162,6 +177,53 @@ impl<const D: usize> Rays<D> {
             mask |= u64::from(L::load(row).less_or_equal(L::splat(height))) << (n * WIDTH);
         }
         mask
+    }
+
+    /// Finds the cones around the directions of the groups. Directions beyond `count` are left from before, and may be
+    /// zero; they only make a cone wider than it need be.
+    #[inline(always)]
+    fn enclose(&mut self) {
+        for group in 0..GROUPS {
+            let mut axis = [0.0f32; D];
+            let mut square = 0.0f32;
+            for k in 0..D {
+                for x in &self.direction[k].as_chunks::<WIDTH>().0[group] {
+                    axis[k] += x;
+                }
+                square += axis[k] * axis[k];
+            }
+            let factor = 1.0 / square.max(1e-10).sqrt();
+            let mut along = [0.0f32; WIDTH];
+            for k in 0..D {
+                axis[k] *= factor;
+                let row = &self.direction[k].as_chunks::<WIDTH>().0[group];
+                for i in 0..WIDTH {
+                    along[i] += axis[k] * row[i];
+                }
+            }
+            let mut cosine = 1.0f32;
+            for x in along {
+                cosine = if x < cosine { x } else { cosine };
+            }
+            // Rounding of products of unit vectors, and more. A cone wider than a half-space is all of space.
+            let cosine = cosine - 1e-5;
+            let sine = (1.0 - cosine * cosine).max(0.0).sqrt() + 1e-5;
+            self.cones[group] = if cosine > 0.0 {
+                GroupCone { axis, cosine, sine }
+            } else {
+                GroupCone { axis: [0.0; D], cosine: -1.0, sine: 1.0 }
+            };
+        }
+    }
+
+    /// The directions of a group.
+    #[inline(always)]
+    pub fn directions<L: Lanes>(&self, group: usize) -> [L; D] {
+        let mut directions = [L::splat(0.0); D];
+        for k in 0..D {
+            directions[k] = L::load(&self.direction[k].as_chunks().0[group]);
+        }
+        directions
     }
 
     /// The direction of a ray, in all lanes.

@@ -9,7 +9,7 @@
 use super::cones::{Cones, dot};
 use super::directions::Rays;
 use super::lanes::Lanes;
-use super::traverse::Question;
+use super::question::Question;
 use crate::accel::WIDTH;
 use crate::geometry::Vector;
 use crate::occlusion::site::fold_cone;
@@ -57,13 +57,12 @@ impl<const D: usize> Fold<D> {
     #[inline(always)]
     fn set_block<L: Lanes>(&mut self, question: &Question<D>, simplices: &[u32]) -> f32 {
         let mesh = question.tracer.mesh();
-        let origin = question.wide.scale.scaled(&question.position);
         let mut rows = [[[0.0f32; WIDTH]; D]; D];
         for lane in 0..WIDTH {
             let simplex = mesh.simplices[simplices[lane.min(simplices.len() - 1)] as usize];
             let others = simplex.into_iter().filter(|&v| mesh.identity[v as usize] != self.identity);
             for (row, vertex) in rows.iter_mut().zip(others) {
-                let edge = question.wide.scale.scaled(&mesh.vertices[vertex as usize]) - origin;
+                let edge = question.wide.scale.scaled(&mesh.vertices[vertex as usize]) - question.scaled;
                 (0..D).for_each(|k| row[k][lane] = edge[k]);
             }
         }

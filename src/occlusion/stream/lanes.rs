@@ -61,6 +61,7 @@ pub(super) trait Lanes: Copy {
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
+    fn square_root(self) -> Self;
     /// Each lane with its sign turned where `sign` is negative.
     fn turned_by(self, sign: Self) -> Self;
     /// The lanes of `negative` where the sign bit of `self` is set, of `other` where it isn't.
@@ -71,6 +72,9 @@ pub(super) trait Lanes: Copy {
     /// Writes those of the eight words that the mask names, each with `tag` in its low bits, side by side to the front
     /// of `out`; what follows them there is overwritten too. Returns how many.
     fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize;
+    /// Starts to bring an item into the cache.
+    #[inline(always)]
+    fn fetch<T>(_items: &[T], _index: u32) {}
 }
 
 /// Plain arrays.
@@ -144,6 +148,11 @@ impl Lanes for Portable {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.map(f32::abs))
+    }
+
+    #[inline(always)]
+    fn square_root(self) -> Self {
+        Self(self.0.map(f32::sqrt))
     }
 
     #[inline(always)]

@@ -8,12 +8,15 @@
 //! - [`directions`]: the rays of a shading point, 64 at a time;
 //! - [`fold`]: what the simplices around a vertex hide;
 //! - [`traverse`]: the rays through the [`crate::accel::WideBvh`];
+//! - [`leaves`]: the rays against the simplices of a leaf;
 //! - [`cones`]: eight simplices as cones seen from the shading point.
 
 mod cones;
 mod directions;
 mod fold;
 mod lanes;
+mod leaves;
+mod question;
 mod traverse;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -23,7 +26,8 @@ pub use lanes::Level;
 use directions::{BLOCK, Rays};
 use fold::Fold;
 use lanes::{Lanes, Portable};
-use traverse::{Question, Traversal};
+use question::Question;
+use traverse::Traversal;
 
 use super::{Sequence, Settings, Site, ambient_occlusion};
 use crate::accel::Tracer;
@@ -166,8 +170,6 @@ fn blocked<L: Lanes, const D: usize>(
         Some((normal, identity)) => stream.fold.set::<L>(question, normal, identity, around),
         None => stream.fold.clear(),
     }
-    stream.traversal.move_origin();
-    let origin = question.wide.scale.centred(&question.position);
     let total = match &source {
         Source::Sequence { samples, .. } => *samples as usize,
         Source::Directions(directions) => directions.len(),
@@ -179,7 +181,7 @@ fn blocked<L: Lanes, const D: usize>(
             Source::Sequence { sequence, frame, .. } => stream.rays.take(sequence, frame, count),
             Source::Directions(directions) => stream.rays.set(&directions[first..first + count]),
         }
-        stream.rays.start_from(&origin);
+        stream.rays.start_from(&question.centred);
         let alive = u64::MAX >> (BLOCK - count);
         let hidden = stream.fold.hidden::<L>(question, &stream.rays, around, alive);
         let hit = stream.traversal.blocked::<L>(question, &stream.rays, alive & !hidden);

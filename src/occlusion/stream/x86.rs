@@ -105,6 +105,21 @@ macro_rules! arithmetic {
         }
 
         #[inline(always)]
+        fn fetch<T>(items: &[T], index: u32) {
+            let start = items.as_ptr().wrapping_add(index as usize).cast::<i8>();
+            for line in 0..size_of::<T>().div_ceil(64) {
+                // SAFETY: SSE by the level; a prefetch may be of any address.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
+            }
+        }
+
+        #[inline(always)]
+        fn square_root(self) -> Self {
+            // SAFETY: AVX by the level.
+            Self(unsafe { _mm256_sqrt_ps(self.0) })
+        }
+
+        #[inline(always)]
         fn turned_by(self, sign: Self) -> Self {
             // SAFETY: AVX by the level.
             Self(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(sign.0, _mm256_set1_ps(-0.0))) })
