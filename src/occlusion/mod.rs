@@ -21,7 +21,7 @@ mod site;
 mod stream;
 mod vertices;
 
-pub use as_published::{Slips, as_published};
+pub use as_published::{AsPublished, Slips, as_published, plain_cramer};
 pub use file::{FileError, Sidecar, decode, encode};
 pub use sampling::{Sampler, Sequence, cube_to_ball, square_to_disk};
 pub use site::Site;

@@ -4,7 +4,7 @@ use super::plan::{Computation, Samples};
 use super::spec::Method;
 use crate::accel::Tracer;
 use crate::occlusion::exact::{self, Budget};
-use crate::occlusion::{self, Sampler};
+use crate::occlusion::{self, Sampler, Slips};
 use crate::progress::Progress;
 use crate::render::Shading;
 
@@ -22,6 +22,7 @@ pub(super) fn values<const D: usize>(
             let values = exact::at_vertices(tracer, budget(computation), progress)?;
             Ok(values.into_iter().map(|value| value as f32).collect())
         }
+        Method::AsPublished => Ok(occlusion::as_published(tracer, Slips::PUBLISHED, &sampling(computation), progress)?),
         _ => Ok(occlusion::at_vertices(tracer, &sampling(computation), progress)?),
     }
 }

@@ -3,7 +3,7 @@
 use super::resolve::Resolver;
 use super::{MAX_DIMENSION, NO_SCENE, OcclusionSource, RenderPlan, StageRef, camera};
 use crate::pipeline::error::Invalid;
-use crate::pipeline::spec::{RenderSpec, Shading};
+use crate::pipeline::spec::{Method, RenderSpec, Shading};
 
 pub(super) fn render(
     resolver: &mut Resolver,
@@ -20,6 +20,14 @@ pub(super) fn render(
     let loaded = |o: usize| matches!(resolver.plan.occlusions[o].source, OcclusionSource::Load(_));
     if shading == Shading::Voxel && occlusion.is_some_and(loaded) {
         let message = "`voxel` computes occlusion at the visible points, which a loaded file has no values for";
+        return Err(Invalid::new(format!("{path}.shading"), message));
+    }
+    let published = |o: usize| match &resolver.plan.occlusions[o].source {
+        OcclusionSource::Compute(computation) => computation.method == Method::AsPublished,
+        OcclusionSource::Load(_) => false,
+    };
+    if shading == Shading::Voxel && occlusion.is_some_and(published) {
+        let message = "`as_published` has values at vertices only; take `flat`, as the thesis did";
         return Err(Invalid::new(format!("{path}.shading"), message));
     }
     resolver.plan.scenes[scene].eye.get_or_insert_with(|| camera.eye.clone());

@@ -22,7 +22,13 @@
 //! Each slip is a switch of its own ([`Slips`]); with all of them off the truth is left. The hierarchy is used to save time:
 //! hits that rounding finds outside a simplex's box aren't seen.
 
+mod cramer;
+
+pub use cramer::plain_cramer;
+
 use rayon::prelude::*;
+
+use cramer::{cramer, laplace};
 
 use super::{Cancelled, Sampler, Sequence, Settings, Site};
 use crate::accel::Tracer;
@@ -81,19 +87,16 @@ pub fn as_published<const D: usize>(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Vec<f32>, Cancelled> {
-    let mesh = tracer.mesh();
-    let incidence = Incidence::new(mesh);
-    let normals = normals(tracer);
-    let value = |(vertex, normal): (usize, &Vector<D>)| {
+    let published = AsPublished::new(tracer, slips);
+    let value = |vertex| {
         if progress.cancelled() {
             return Err(Cancelled);
         }
-        let own = (!slips.own_simplices).then(|| Site::at_vertex(tracer, &incidence, vertex as u32));
-        let value = Published { tracer, slips, own }.value(vertex as u32, normal, settings);
+        let value = published.at_vertex(vertex, settings);
         progress.advance(1);
         Ok(value)
     };
-    normals.par_iter().enumerate().map(value).collect()
+    (0..tracer.mesh().vertices.len() as u32).into_par_iter().map(value).collect()
 }
 
 /// The unit normals by the formal determinants of the simplices' edges, in the order of their vertices; zero where there
@@ -114,20 +117,29 @@ fn normals<const D: usize>(tracer: &Tracer<D>) -> Vec<Vector<D>> {
     sums.iter().map(|sum| sum.try_normalize(0.0).unwrap_or_else(Vector::zeros)).collect()
 }
 
-/// One vertex's question.
-struct Published<'t, const D: usize> {
+/// The algorithm on a mesh.
+#[derive(Debug)]
+pub struct AsPublished<'t, const D: usize> {
     tracer: &'t Tracer<'t, D>,
     slips: Slips,
-    /// What the vertex's own simplices hide, where they aren't tested like others.
-    own: Option<Site<D>>,
+    incidence: Incidence,
+    normals: Vec<Vector<D>>,
 }
 
-impl<const D: usize> Published<'_, D> {
-    fn value(&self, vertex: u32, normal: &Vector<D>, settings: &Settings) -> f32 {
-        let mut sequence = Sequence::new(Sampler::Random, settings.seed, u64::from(vertex));
+impl<'t, const D: usize> AsPublished<'t, D> {
+    /// With these slips.
+    pub fn new(tracer: &'t Tracer<'t, D>, slips: Slips) -> Self {
+        Self { tracer, slips, incidence: Incidence::new(tracer.mesh()), normals: normals(tracer) }
+    }
+
+    /// The value 1 - occlusion at a vertex, by `settings.samples` rays; `settings.sampler` isn't asked.
+    pub fn at_vertex(&self, vertex: u32, settings: &Settings) -> f32 {
+        let normal = &self.normals[vertex as usize];
         if normal.amax() == 0.0 {
             return 1.0;
         }
+        let own = (!self.slips.own_simplices).then(|| Site::at_vertex(self.tracer, &self.incidence, vertex));
+        let mut sequence = Sequence::new(Sampler::Random, settings.seed, u64::from(vertex));
         let origin = self.tracer.mesh().vertices[vertex as usize];
         let frame = Frame::new(normal);
         let (mut rays, mut hits) = (0u32, 0u32);
@@ -143,7 +155,7 @@ impl<const D: usize> Published<'_, D> {
                 continue;
             }
             rays += 1;
-            hits += u32::from(self.hits_something(&Ray::new(origin, direction), settings.max_distance));
+            hits += u32::from(self.hits_something(&Ray::new(origin, direction), own.as_ref(), settings.max_distance));
             if rays == settings.samples {
                 break;
             }
@@ -151,20 +163,21 @@ impl<const D: usize> Published<'_, D> {
         1.0 - (f64::from(hits) / f64::from(rays.max(1))) as f32
     }
 
-    fn hits_something(&self, ray: &Ray<D>, limit: f32) -> bool {
+    /// `own` is what the vertex's own simplices hide, where they aren't tested like others.
+    fn hits_something(&self, ray: &Ray<D>, own: Option<&Site<D>>, limit: f32) -> bool {
         let mesh = self.tracer.mesh();
-        if self.own.as_ref().is_some_and(|own| own.hides(ray)) {
+        if own.is_some_and(|own| own.hides(ray)) {
             return true;
         }
         self.tracer.bvh().any(ray, limit, |simplex| {
             let corners = mesh.corners(simplex);
-            if self.own.is_some() && corners.contains(&ray.origin) {
+            if own.is_some() && corners.contains(&ray.origin) {
                 return false;
             }
             if !self.slips.single_precision {
                 return self.tracer.hits(simplex, ray, limit);
             }
-            let (t, weights) = cramer(&corners, ray, self.slips);
+            let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, self.slips);
             let ahead = if self.slips.hits_at_zero { t >= 0.0 } else { t > 0.0 };
             ahead && t <= limit && weights.iter().all(|&w| w >= 0.0)
         })
@@ -185,100 +198,9 @@ fn sphere_point<const D: usize>(sequence: &mut Sequence) -> Vector<D> {
     point
 }
 
-/// The distance and the barycentric coordinates, by Cramer's rule.
-fn cramer<const D: usize>(corners: &[Vector<D>; D], ray: &Ray<D>, slips: Slips) -> (f32, [f32; D]) {
-    let a = corners[0];
-    let mut columns: [Vector<D>; D] = std::array::from_fn(|i| if i == 0 { -ray.direction } else { corners[i] - a });
-    let mut right = ray.origin - a;
-    if slips.printed_equations {
-        columns[0] = ray.direction;
-        if D == 4 {
-            columns[3] = corners[3].map(|x| x - a[0]);
-            right[1] = ray.origin[1] - a[0];
-        }
-    }
-    let denominator = laplace(&columns, slips.contracted);
-    let solution: [f32; D] = std::array::from_fn(|i| {
-        let column = std::mem::replace(&mut columns[i], right);
-        let numerator = laplace(&columns, slips.contracted);
-        columns[i] = column;
-        numerator / denominator
-    });
-    let mut weights = solution;
-    weights[0] = solution[1..].iter().fold(1.0, |rest, l| rest - l);
-    (solution[0], weights)
-}
-
-/// A determinant by Laplace's expansion along the first row, and so on down to 2 x 2.
-fn laplace<const D: usize>(columns: &[Vector<D>; D], contracted: bool) -> f32 {
-    let all = [0, 1, 2, 3];
-    minor(columns, 0, &all[..D], contracted)
-}
-
-fn minor<const D: usize>(columns: &[Vector<D>; D], row: usize, kept: &[usize], contracted: bool) -> f32 {
-    // a - b c, rounded once or twice.
-    let subtract = |a: f32, b: f32, c: f32| if contracted { (-b).mul_add(c, a) } else { a - b * c };
-    if let &[i, j] = kept {
-        let (first, second) = (&columns[i], &columns[j]);
-        let product = second[row] * first[row + 1];
-        return if contracted {
-            first[row].mul_add(second[row + 1], -product)
-        } else {
-            first[row] * second[row + 1] - product
-        };
-    }
-    let mut sum = 0.0;
-    for (k, &column) in kept.iter().enumerate() {
-        let mut rest = [0; 3];
-        let others = kept.iter().filter(|&&c| c != column);
-        rest.iter_mut().zip(others).for_each(|(place, &c)| *place = c);
-        let value = minor(columns, row + 1, &rest[..kept.len() - 1], contracted);
-        let entry = columns[column][row];
-        sum = match k {
-            0 => entry * value,
-            _ if k % 2 == 1 => subtract(sum, entry, value),
-            _ => subtract(sum, -entry, value),
-        };
-    }
-    sum
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{determinant, widen};
-
-    fn determinants<const D: usize>() {
-        let mut sequence = Sequence::new(Sampler::Random, 3, 4);
-        for contracted in [false, true] {
-            for _ in 0..100 {
-                let columns: [Vector<D>; D] = std::array::from_fn(|_| {
-                    let p = sequence.next_point::<4>();
-                    Vector::from_fn(|i, _| p[i])
-                });
-                let expected = determinant(&columns.map(|c| widen(&c)));
-                assert!((f64::from(laplace(&columns, contracted)) - expected).abs() < 1e-5);
-            }
-        }
-    }
-
-    #[test]
-    fn laplace_gives_determinants() {
-        determinants::<3>();
-        determinants::<4>();
-    }
-
-    #[test]
-    fn cramer_finds_the_crossing() {
-        let corners: [Vector<4>; 4] = std::array::from_fn(|i| Vector::from_fn(|r, _| if r == i { 2.0 } else { 0.0 }));
-        let ray = Ray::new(Vector::zeros(), Vector::from([0.25, 0.25, 0.5, 0.5]));
-        let (t, weights) = cramer(&corners, &ray, Slips::PUBLISHED);
-        assert!((t - 4.0 / 3.0).abs() < 1e-6, "{t}");
-        let expected = [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0];
-        assert!(weights.iter().zip(expected).all(|(w, e): (&f32, f32)| (w - e).abs() < 1e-6), "{weights:?}");
-        let printed = Slips { printed_equations: true, ..Slips::PUBLISHED };
-        assert!(cramer(&corners, &ray, printed).0 < 0.0, "t counts backwards");
-    }
 
     #[test]
     fn angles_miss_the_density() {
