@@ -87,10 +87,10 @@ impl PictureFiles {
                 writer.write_slab(first, rgb).map_err(named(file))?;
             }
         }
-        if let Some((slices, place)) = &mut self.slices {
-            if let Values::U8(rgba) = &slab[*place].values {
-                slices.add_slab(first, rgba)?;
-            }
+        if let Some((slices, place)) = &mut self.slices
+            && let Values::U8(rgba) = &slab[*place].values
+        {
+            slices.add_slab(first, rgba)?;
         }
         Ok(match &slab[self.opacity].values {
             Values::F32(opacity) => opacity.iter().filter(|&&o| o > 0.0).count() as u64,

@@ -15,10 +15,10 @@ use crate::render::{Channel, Fragment};
 /// With the bytes that are needed and those that are left.
 pub(super) fn check(plan: &Plan, stale: &Stale) -> Result<(), RunError> {
     let memory = (0..plan.renders.len()).map(|render| (layer_memory(plan, stale, render), render)).max();
-    if let (Some((needed, render)), Some(available)) = (memory, available_memory()) {
-        if needed > available {
-            return Err(RunError::Memory { render: plan.renders[render].id.clone(), needed, available });
-        }
+    if let (Some((needed, render)), Some(available)) = (memory, available_memory())
+        && needed > available
+    {
+        return Err(RunError::Memory { render: plan.renders[render].id.clone(), needed, available });
     }
     let disk = (0..plan.writes.len()).map(|write| disk(plan, stale, write)).fold(0, u64::saturating_add);
     export::check_free_space(&plan.out, disk)?;
