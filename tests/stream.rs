@@ -176,7 +176,8 @@ fn any_rays<const D: usize>() {
             let expected = rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
             all += expected;
             for level in Level::available() {
-                let found = Stream::new(level).count_occluded(&tracer, &origin, &directions, limit, ignored);
+                let found =
+                    Stream::new(level).count_occluded(&tracer, &origin, directions[0], &directions, limit, ignored);
                 assert_eq!(found, expected, "{level:?} {n}");
             }
         }

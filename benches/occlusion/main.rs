@@ -36,6 +36,9 @@ struct Options {
     embree: bool,
 }
 
+/// How long each timing takes at least.
+const SECONDS: f64 = 0.2;
+
 /// One timing: millions of rays per second, and the mean value.
 #[derive(Clone, Copy, Default)]
 struct Timing {
@@ -53,11 +56,11 @@ fn median(mut timings: Vec<Timing>) -> Timing {
     timings[timings.len() / 2]
 }
 
-/// Repeats a pass over the vertices for at least 0.3 s.
+/// Repeats a pass over the vertices for at least [`SECONDS`].
 fn time(vertices: usize, samples: usize, mut pass: impl FnMut() -> f64) -> Timing {
     let start = thread_seconds();
     let (mut passes, mut mean) = (0, 0.0);
-    while passes == 0 || thread_seconds() - start < 0.3 {
+    while passes == 0 || thread_seconds() - start < SECONDS {
         mean = pass();
         passes += 1;
     }
@@ -146,7 +149,8 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
                     let normal = normals[v as usize];
                     rays::directions(&table, v, &normal, &mut directions);
                     let origin = mesh.vertices[v as usize] + normal * offset;
-                    blocked += u64::from(stream.count_occluded(&tracer, &origin, &directions, f32::INFINITY, None));
+                    blocked +=
+                        u64::from(stream.count_occluded(&tracer, &origin, normal, &directions, f32::INFINITY, None));
                 }
                 1.0 - blocked as f64 / (list.len() * samples) as f64
             }));

@@ -107,7 +107,7 @@ pub fn directions<const D: usize>(table: &[Vec<f32>], vertex: u32, n: &Vector<D>
         loop {
             (x, y) = (r.symmetric(), r.symmetric());
             l = x * x + y * y;
-            if l < 1.0 && l >= 1e-6 {
+            if (1e-6..1.0).contains(&l) {
                 break;
             }
         }
@@ -129,7 +129,7 @@ pub fn directions<const D: usize>(table: &[Vec<f32>], vertex: u32, n: &Vector<D>
         loop {
             q.iter_mut().for_each(|c| *c = r.symmetric());
             let l = q.iter().map(|c| c * c).sum::<f32>();
-            if l < 1.0 && l >= 1e-6 {
+            if (1e-6..1.0).contains(&l) {
                 q.iter_mut().for_each(|c| *c *= 1.0 / l.sqrt());
                 break;
             }

@@ -16,8 +16,8 @@ use crate::mesh::Mesh;
 
 /// Children of a node, and simplices of a leaf.
 pub const WIDTH: usize = 8;
-/// What boxes grow by on each side, in widths of the scene: the box test makes at most seven roundings of numbers below
-/// 3, each relative to 2^-24.
+/// What boxes grow by on each side, in widths of the scene. All rounding of a box, of its place, of the origin and in the box
+/// test is less: ten times numbers below 3/2 relative to 2^-24.
 const GROWTH: f64 = 1.0 / (1 << 20) as f64;
 /// Cost of testing the boxes of one binary node, in simplex blocks.
 const BOX_COST: f32 = 0.4;
@@ -28,12 +28,14 @@ pub const TAG_BITS: u32 = 6;
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct WideNode<const D: usize> {
-    /// For each axis the lower, then the upper planes.
-    pub planes: [[[f32; WIDTH]; 2]; D],
+    /// For each axis the middles of the boxes, then half their widths.
+    pub boxes: [[[f32; WIDTH]; 2]; D],
     /// Indices of nodes or of leaves, shifted left by [`TAG_BITS`]. Larger boxes come last.
     pub children: [u32; WIDTH],
     /// Which of the children are leaves, lane 0 lowest.
     pub leaves: u8,
+    /// Which places are used.
+    pub used: u8,
 }
 
 /// Up to eight simplices.
@@ -44,6 +46,10 @@ pub struct Leaf<const D: usize> {
     pub corners: [[[f32; WIDTH]; D]; D],
     /// Which simplices of the mesh these are; [`Leaf::UNUSED`] where there are fewer.
     pub simplices: [u32; WIDTH],
+    /// The middle of the corners, scaled, and a bound on the 1-norm of what leads from there to a corner.
+    pub middle: [f32; D],
+    /// See `middle`.
+    pub reach: f32,
 }
 
 impl<const D: usize> Leaf<D> {
@@ -93,6 +99,10 @@ pub struct WideBvh<const D: usize> {
     pub leaves: Vec<Leaf<D>>,
     /// The coordinates used.
     pub scale: Scale<D>,
+    /// Nodes on the longest way from the root to a leaf.
+    pub depth: usize,
+    /// The number of simplices of the mesh.
+    total: usize,
 }
 
 /// What becomes of the nodes of the binary tree.
@@ -130,27 +140,34 @@ impl Plan {
 impl<const D: usize> WideBvh<D> {
     /// Makes it from the binary tree over simplices of the mesh.
     pub fn new(bvh: &Bvh<D>, mesh: &Mesh<D>) -> Self {
-        let mut wide = Self { nodes: Vec::new(), leaves: Vec::new(), scale: Scale::of(&mesh.vertices) };
+        let mut wide = Self {
+            nodes: Vec::new(),
+            leaves: Vec::new(),
+            scale: Scale::of(&mesh.vertices),
+            depth: 0,
+            total: mesh.simplices.len(),
+        };
         if bvh.nodes.is_empty() {
             return wide;
         }
         let plan = Plan::new(bvh);
         wide.nodes.push(WideNode::empty());
-        let mut open = vec![(0usize, 0usize)];
-        while let Some((source, target)) = open.pop() {
+        let mut open = vec![(0usize, 0usize, 1usize)];
+        while let Some((source, target, depth)) = open.pop() {
+            wide.depth = wide.depth.max(depth);
             let children = Self::children(bvh, &plan, source);
             for (lane, &child) in children.iter().enumerate() {
                 let index = if plan.is_leaf[child] {
                     let (first, end) = plan.ranges[child];
                     wide.leaves.push(Leaf::new(&bvh.order[first as usize..end as usize], mesh, &wide.scale));
                     wide.nodes[target].leaves |= 1 << lane;
-                    wide.leaves.len() - 1
+                    (wide.leaves.len() - 1) as u32
                 } else {
-                    open.push((child, wide.nodes.len()));
+                    open.push((child, wide.nodes.len(), depth + 1));
                     wide.nodes.push(WideNode::empty());
-                    wide.nodes.len() - 1
+                    (wide.nodes.len() - 1) as u32
                 };
-                wide.nodes[target].set(lane, &bvh.nodes[child].bounds, (index as u32) << TAG_BITS, &wide.scale);
+                wide.nodes[target].set(lane, &bvh.nodes[child].bounds, index << TAG_BITS, &wide.scale);
             }
         }
         wide.nodes.shrink_to_fit();
@@ -158,10 +175,12 @@ impl<const D: usize> WideBvh<D> {
         wide
     }
 
-    /// Whether there are few enough nodes and leaves for references to them, and the point is near enough to the scene
-    /// for its box tests. If not, ask the binary tree.
+    /// Whether there are few enough nodes and leaves for references to them, and the point is near enough to the scene for its
+    /// box tests. If not, ask the binary tree.
     pub fn serves(&self, point: &Vector<D>) -> bool {
-        self.nodes.len().max(self.leaves.len()) < 1 << (32 - TAG_BITS) && self.scale.centred(point).amax() <= 1.0
+        self.nodes.len().max(self.leaves.len()) < 1 << (32 - TAG_BITS)
+            && self.total < 1 << 31
+            && self.scale.centred(point).amax() <= 1.0
     }
 
     /// The nodes of the binary tree that become the children of what `source` becomes, smallest box first.
@@ -185,23 +204,30 @@ impl<const D: usize> WideBvh<D> {
 
 impl<const D: usize> WideNode<D> {
     fn empty() -> Self {
-        // Beyond any distance from either side: the near plane is never before the far one.
-        Self { planes: [[[1e30; WIDTH], [-1e30; WIDTH]]; D], children: [0; WIDTH], leaves: 0 }
+        // Of negative width: the near plane is never before the far one.
+        Self { boxes: [[[0.0; WIDTH], [-1e30; WIDTH]]; D], children: [0; WIDTH], leaves: 0, used: 0 }
     }
 
     fn set(&mut self, lane: usize, bounds: &Aabb<D>, child: u32, scale: &Scale<D>) {
         for axis in 0..D {
-            let place = |x: f32, growth: f64| ((f64::from(x) - scale.centre[axis]) * scale.factor + growth) as f32;
-            self.planes[axis][0][lane] = place(bounds.min[axis], -GROWTH);
-            self.planes[axis][1][lane] = place(bounds.max[axis], GROWTH);
+            let place = |x: f32| (f64::from(x) - scale.centre[axis]) * scale.factor;
+            let (low, high) = (place(bounds.min[axis]), place(bounds.max[axis]));
+            self.boxes[axis][0][lane] = (0.5 * (low + high)) as f32;
+            self.boxes[axis][1][lane] = (0.5 * (high - low) + GROWTH) as f32;
         }
         self.children[lane] = child;
+        self.used |= 1 << lane;
     }
 }
 
 impl<const D: usize> Leaf<D> {
     fn new(simplices: &[u32], mesh: &Mesh<D>, scale: &Scale<D>) -> Self {
-        let mut leaf = Self { corners: [[[0.0; WIDTH]; D]; D], simplices: [Self::UNUSED; WIDTH] };
+        let bounds =
+            Aabb::of(simplices.iter().flat_map(|&s| mesh.simplices[s as usize]).map(|v| &mesh.vertices[v as usize]));
+        let (low, high) = (scale.scaled(&bounds.min), scale.scaled(&bounds.max));
+        let middle: [f32; D] = std::array::from_fn(|k| 0.5 * (low[k] + high[k]));
+        let reach = (0..D).map(|k| (middle[k] - low[k]).max(high[k] - middle[k])).sum::<f32>() * (1.0 + 1e-5);
+        let mut leaf = Self { corners: [[[0.0; WIDTH]; D]; D], simplices: [Self::UNUSED; WIDTH], middle, reach };
         for lane in 0..WIDTH {
             // Unused lanes repeat the last simplex, so that their numbers are harmless.
             let simplex = simplices[lane.min(simplices.len() - 1)];

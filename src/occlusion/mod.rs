@@ -13,6 +13,7 @@
 //!   convex surroundings block nothing; a concave fold blocks the same, be the surface open or closed;
 //! - a visible point inside a simplex ignores that simplex.
 
+mod as_published;
 pub mod exact;
 mod file;
 mod sampling;
@@ -20,6 +21,7 @@ mod site;
 mod stream;
 mod vertices;
 
+pub use as_published::{Slips, as_published};
 pub use file::{FileError, Sidecar, decode, encode};
 pub use sampling::{Sampler, Sequence, cube_to_ball, square_to_disk};
 pub use site::Site;
@@ -43,3 +45,25 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]
 pub struct Cancelled;
+
+/// Why there are no values.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The work was cancelled.
+    #[error("interrupted")]
+    Cancelled,
+    /// The closed form would have too many pieces.
+    #[error("{place}: exact occlusion is too dear here: {source}")]
+    OverBudget {
+        /// The vertex or voxel.
+        place: String,
+        /// How rich its view is.
+        source: exact::OverBudget,
+    },
+}
+
+impl From<Cancelled> for Error {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}

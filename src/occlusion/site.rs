@@ -61,10 +61,16 @@ impl<const D: usize> Site<D> {
         Frame::new(&self.normal)
     }
 
+    /// Whether the simplices with a corner here hide the ray's direction.
+    #[inline]
+    pub(super) fn hides(&self, ray: &Ray<D>) -> bool {
+        self.fold.iter().any(|cone| cone.contains(&ray.direction))
+    }
+
     /// The visibility V of a direction: whether a ray escapes, or reaches `limit`.
     #[inline]
     pub fn is_visible(&self, tracer: &Tracer<D>, direction: Vector<D>, limit: f32) -> bool {
         let ray = Ray::new(self.position, direction);
-        !self.fold.iter().any(|cone| cone.contains(&ray.direction)) && !tracer.occluded(&ray, limit, self.ignored)
+        !self.hides(&ray) && !tracer.occluded(&ray, limit, self.ignored)
     }
 }

@@ -168,7 +168,7 @@ fn vti_settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option
 
 /// What is known about values that were computed.
 pub(super) fn sidecar(values: &[f32], computation: &Computation, mesh_hash: &str) -> Sidecar {
-    let Computation { method, samples, max_distance, seed } = computation;
+    let Computation { method, samples, max_distance, seed, .. } = computation;
     let fixed = if let Samples::Fixed(n) = samples { Some(*n) } else { None };
     Sidecar {
         count: values.len(),

@@ -18,6 +18,7 @@ mod error;
 mod figure;
 mod files;
 mod limits;
+mod occlude;
 mod one_or_many;
 pub mod overrides;
 pub mod plan;

@@ -12,16 +12,17 @@ use std::time::{Duration, Instant};
 use super::build::{AnyMesh, camera};
 use super::cache::{Cache, Keys};
 use super::files::{self, PictureFiles};
+use super::occlude::{self, voxel_shading};
 use super::plan::{Computation, OcclusionSource, Plan, RenderPlan, Samples, StageRef, grouped};
 use super::prepare::{Loaded, Prepared, read_values, sidecar_path};
 use super::report::{FileReport, Report};
-use super::spec::{self, Method};
+use super::spec;
 use super::work::Stale;
 use super::{Error, Pipeline, Settings, figure, limits};
 use crate::accel::Tracer;
 use crate::export;
 use crate::mesh::Mesh;
-use crate::occlusion::{self, Cancelled, Sampler};
+use crate::occlusion::{self, Cancelled};
 use crate::progress::Progress;
 use crate::render::{CameraError, Picture, Shading};
 
@@ -34,6 +35,9 @@ pub enum RunError {
     /// Ctrl-C.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// There are no values of ambient occlusion.
+    #[error("ambient occlusion: {0}")]
+    Occlusion(occlusion::Error),
     /// A file can't be written.
     #[error(transparent)]
     Export(#[from] export::Error),
@@ -55,6 +59,15 @@ pub enum RunError {
     /// Threads can't be started.
     #[error("can't start the threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+impl From<occlusion::Error> for RunError {
+    fn from(error: occlusion::Error) -> Self {
+        match error {
+            occlusion::Error::Cancelled => Self::Cancelled(Cancelled),
+            error => Self::Occlusion(error),
+        }
+    }
 }
 
 /// Runs a pipeline and writes its files. The files are the same bytes on any number of threads.
@@ -230,6 +243,9 @@ impl Run<'_> {
                 let rays = *samples as f64 * vertices as f64;
                 format!("{} rays, {:.2} million a second", grouped(rays as u64), rays / time.as_secs_f64() / 1e6)
             }
+            OcclusionSource::Compute(Computation { samples: Samples::Exact, .. }) => {
+                format!("{:.3} ms a vertex", time.as_secs_f64() * 1e3 / vertices.max(1) as f64)
+            }
             _ => String::new(),
         }
     }
@@ -253,7 +269,7 @@ impl Run<'_> {
                     _ => {
                         let start = Instant::now();
                         self.progress.begin(&format!("occlusion {}", occlusion.id), count as u64);
-                        let values = occlusion::at_vertices(scene.tracer(), &sampling(computation), self.progress);
+                        let values = occlude::values(scene.tracer(), computation, self.progress);
                         self.progress.end();
                         self.times.entry(StageRef::Occlusion(index)).or_default().1 =
                             self.rate(index, count, start.elapsed());
@@ -344,24 +360,10 @@ impl Run<'_> {
 /// The working set of a slab.
 const SLAB_BYTES: usize = 256 << 20;
 
-/// The settings that a computation stands for.
-fn sampling(computation: &Computation) -> occlusion::Settings {
-    let samples = match computation.samples {
-        Samples::Fixed(n) | Samples::Target { max_samples: n, .. } => n,
-        Samples::Exact => 1,
-    };
-    occlusion::Settings {
-        sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
-        samples: u32::try_from(samples).unwrap_or(u32::MAX),
-        seed: computation.seed,
-        max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
-    }
-}
-
 fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Vec<f32>>) -> Shading<'v> {
     let Some(o) = render.occlusion else { return Shading::None };
     match (render.shading, &plan.occlusions[o].source) {
-        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(sampling(computation)),
+        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => voxel_shading(computation),
         (spec::Shading::Flat, _) => Shading::Flat(&values[&o]),
         _ => Shading::Smooth(&values[&o]),
     }

@@ -71,7 +71,10 @@ pub struct OcclusionSpec {
     /// With `target_error`: at most so many rays a vertex (default 65536).
     #[schemars(range(min = 1, max = 16777216))]
     pub max_samples: Option<u64>,
-    /// Occluders further away than this don't count (default: all count).
+    /// With `exact`: at most so many convex pieces a vertex, of a microsecond each (default 10000000).
+    #[schemars(range(min = 1, max = 1000000000))]
+    pub max_cones: Option<u64>,
+    /// Occluders further away than this don't count (default: all count); not with `exact`.
     pub max_distance: Option<f64>,
     /// Writes the values into this file, `NAME.f32`.
     pub file: Option<String>,

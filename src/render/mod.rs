@@ -20,7 +20,7 @@ pub use visibility::NOTHING;
 use std::ops::Range;
 
 use crate::accel::Tracer;
-use crate::occlusion::Cancelled;
+use crate::occlusion::Error;
 use crate::progress::Progress;
 use crate::volume::{Array, Grid};
 
@@ -41,13 +41,13 @@ impl<const D: usize> Picture<'_, D> {
     /// The arrays of some layers, in the order of `channels`.
     ///
     /// # Errors
-    /// [`Cancelled`] if `progress` says so.
+    /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where [`Shading::Exact`] is too dear.
     pub fn slab(
         &self,
         layers: Range<usize>,
         channels: &[Channel],
         progress: &dyn Progress,
-    ) -> Result<Vec<Array>, Cancelled> {
+    ) -> Result<Vec<Array>, Error> {
         let visible = visibility::ray_cast(self.tracer, &self.camera, &self.grid, layers.clone(), progress)?;
         let fragments = shading::shade(self, layers.clone(), &visible, progress)?;
         Ok(channels.iter().map(|c| c.array(self, layers.clone(), &fragments)).collect())

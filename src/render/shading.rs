@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{NOTHING, Picture};
 use crate::geometry::{Cone, Ray, Vector, Vector64, narrow, normal_of, widen};
 use crate::mesh::normals::unit;
-use crate::occlusion::{Cancelled, Settings, Site, ambient_occlusion};
+use crate::occlusion::{Error, Settings, Site, ambient_occlusion, exact};
 use crate::progress::Progress;
 
 /// Where the ambient occlusion of a visible point comes from.
@@ -21,6 +21,8 @@ pub enum Shading<'s> {
     Smooth(&'s [f32]),
     /// Computed at the point itself, on the side that faces the ray: slow, the reference for the other two.
     Voxel(Settings),
+    /// The same in closed form.
+    Exact(exact::Budget),
 }
 
 /// What one voxel sees.
@@ -45,23 +47,23 @@ pub(super) fn shade<const D: usize>(
     layers: Range<usize>,
     visible: &[u32],
     progress: &dyn Progress,
-) -> Result<Vec<Fragment>, Cancelled> {
+) -> Result<Vec<Fragment>, Error> {
     let [width, height, _] = picture.grid.dimensions;
     let mut fragments = vec![Fragment::BACKGROUND; visible.len()];
     let rows = fragments.par_chunks_mut(width).zip(visible.par_chunks(width)).enumerate();
     rows.try_for_each(|(row, (fragments, visible))| {
         if progress.cancelled() {
-            return Err(Cancelled);
+            return Err(Error::Cancelled);
         }
         let (j, k) = (row % height, layers.start + row / height);
         for (i, (fragment, &simplex)) in fragments.iter_mut().zip(visible).enumerate() {
             if simplex != NOTHING {
                 // Occlusion at the voxel itself makes a single one take long.
-                if matches!(picture.shading, Shading::Voxel(_)) && progress.cancelled() {
-                    return Err(Cancelled);
+                if matches!(picture.shading, Shading::Voxel(_) | Shading::Exact(_)) && progress.cancelled() {
+                    return Err(Error::Cancelled);
                 }
                 let number = (i + width * (j + height * k)) as u64;
-                *fragment = shade_voxel(picture, [i, j, k], number, simplex);
+                *fragment = shade_voxel(picture, [i, j, k], number, simplex)?;
             }
         }
         progress.advance(width as u64);
@@ -70,24 +72,39 @@ pub(super) fn shade<const D: usize>(
     Ok(fragments)
 }
 
-fn shade_voxel<const D: usize>(picture: &Picture<D>, index: [usize; 3], number: u64, simplex: u32) -> Fragment {
+fn shade_voxel<const D: usize>(
+    picture: &Picture<D>,
+    index: [usize; 3],
+    number: u64,
+    simplex: u32,
+) -> Result<Fragment, Error> {
     let mesh = picture.tracer.mesh();
     let ray = picture.camera.voxel_ray(&picture.grid, index);
     let crossing = Cone::of_simplex(&ray.origin, &mesh.corners(simplex)).crossing(&ray.direction);
     let corner = |values: &[f32], i: usize| f64::from(values[mesh.simplices[simplex as usize][i] as usize]);
+    // The visible point and its normal towards the eye.
+    let seen = || {
+        let corners = mesh.corners(simplex).map(|v| widen(&v));
+        let point = (0..D).fold(Vector64::zeros(), |p, i| p + corners[i] * crossing.barycentric[i]);
+        (narrow(&point), facing_normal(&corners, &ray))
+    };
     let value = match &picture.shading {
         Shading::None => 1.0,
         Shading::Flat(values) => ((0..D).map(|i| corner(values, i)).sum::<f64>() / D as f64) as f32,
         Shading::Smooth(values) => (0..D).map(|i| corner(values, i) * crossing.barycentric[i]).sum::<f64>() as f32,
         Shading::Voxel(settings) => {
-            let corners = mesh.corners(simplex).map(|v| widen(&v));
-            let point = (0..D).fold(Vector64::zeros(), |p, i| p + corners[i] * crossing.barycentric[i]);
-            let site = Site::inside_simplex(narrow(&point), facing_normal(&corners, &ray), simplex);
+            let (point, normal) = seen();
+            let site = Site::inside_simplex(point, normal, simplex);
             ambient_occlusion(picture.tracer, &site, settings, number)
+        }
+        Shading::Exact(budget) => {
+            let (point, normal) = seen();
+            let place = || format!("voxel ({}, {}, {})", index[0], index[1], index[2]);
+            exact::at_point(picture.tracer, &point, &normal, simplex, *budget, place)? as f32
         }
     };
     let depth = crossing.t * widen(&ray.direction).norm();
-    Fragment { simplex, ambient_occlusion: value.clamp(0.0, 1.0), depth: depth as f32 }
+    Ok(Fragment { simplex, ambient_occlusion: value.clamp(0.0, 1.0), depth: depth as f32 })
 }
 
 /// The simplex's unit normal on the side that the ray comes from.

@@ -12,6 +12,7 @@
 //! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`] |
 //! | `cut_cube` | a box minus boxes | [`lattice`] |
 //! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
+//! | `isosurface` | where a formula or a grid of values passes a value | [`isosurface`] |
 //!
 //! [`build_object`] checks everything that can be wrong with an object, so whoever checks a pipeline builds its scene.
 
@@ -22,6 +23,7 @@ mod error;
 mod extrude;
 mod file;
 mod hypersphere;
+pub mod isosurface;
 pub mod lattice;
 mod numbers;
 mod object;
@@ -37,6 +39,7 @@ pub use cut_cube::{CutCubeSpec, CutSpec};
 pub use error::Error;
 pub use extrude::ExtrudeSpec;
 pub use hypersphere::SphereSpec;
+pub use isosurface::IsosurfaceSpec;
 pub use numbers::{MAX_SIMPLICES, OneOrEach};
 pub use object::{ObjectSpec, Orientation, Shape, build_object};
 pub use simplices::SimplicesSpec;

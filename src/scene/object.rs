@@ -10,6 +10,7 @@ use super::cuboid::{BoxSpec, TesseractSpec};
 use super::cut_cube::CutCubeSpec;
 use super::extrude::ExtrudeSpec;
 use super::hypersphere::SphereSpec;
+use super::isosurface::IsosurfaceSpec;
 use super::numbers::AXES;
 use super::simplices::SimplicesSpec;
 use super::transform::{self, TransformStep};
@@ -47,6 +48,9 @@ pub struct ObjectSpec {
     /// Shape: a sphere in 3D.
     #[serde(default)]
     pub sphere: Option<SphereSpec>,
+    /// Shape: where a field, given by a formula or by a grid of values, passes a value.
+    #[serde(default)]
+    pub isosurface: Option<IsosurfaceSpec>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -88,6 +92,8 @@ pub enum Shape<'a> {
     Hypersphere(&'a SphereSpec),
     /// A sphere in 3D.
     Sphere(&'a SphereSpec),
+    /// Where a field passes a value.
+    Isosurface(&'a IsosurfaceSpec),
 }
 
 impl Shape<'_> {
@@ -102,6 +108,7 @@ impl Shape<'_> {
             Shape::Tesseract(_) => "tesseract",
             Shape::Hypersphere(_) => "hypersphere",
             Shape::Sphere(_) => "sphere",
+            Shape::Isosurface(_) => "isosurface",
         }
     }
 
@@ -128,6 +135,7 @@ impl Shape<'_> {
                 Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
             }
             Shape::Sphere(spec) => spec.build("sphere"),
+            Shape::Isosurface(spec) => spec.build(),
         }
     }
 }
@@ -144,6 +152,7 @@ impl ObjectSpec {
             self.tesseract.as_ref().map(Shape::Tesseract),
             self.hypersphere.as_ref().map(Shape::Hypersphere),
             self.sphere.as_ref().map(Shape::Sphere),
+            self.isosurface.as_ref().map(Shape::Isosurface),
         ];
         let mut given = shapes.into_iter().flatten();
         match (given.next(), given.next()) {
@@ -155,7 +164,7 @@ impl ObjectSpec {
             _ => Err(Error::invalid(
                 "",
                 "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, \
-                 hypersphere, sphere",
+                 hypersphere, sphere, isosurface",
             )),
         }
     }

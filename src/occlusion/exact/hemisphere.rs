@@ -27,8 +27,8 @@ impl Default for Budget {
 /// The scene is too rich for exact occlusion within the budget.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "exact occlusion: the {occluders} simplices above the horizon of ({}) cut its view into more than {} cones; \
-     raise the budget, or use `method: sobol`",
+    "the {occluders} simplices above the horizon of ({}) cut its view into more than {} cones; raise `max_cones`, \
+     or use `method: sobol`",
     point.iter().map(f32::to_string).collect::<Vec<_>>().join(", "),
     budget.cones
 )]

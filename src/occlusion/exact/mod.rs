@@ -35,6 +35,8 @@
 //! within a simplex, as the visible point of a voxel does, that simplex is to be left out. Simplices need not be
 //! sorted, oriented, closed or disjoint; one whose hyperplane contains p occludes nothing.
 //!
+//! Among the simplices of a mesh [`at_vertices`] does all this, with the hierarchy as a sieve.
+//!
 //! All simplices of a scene may be given: those below the horizon are dropped at once. Of bodies that are closed, and
 //! known to be seen from outside, the simplices turned away from p may be left out, for half the time.
 
@@ -47,5 +49,7 @@ mod polygon;
 mod precise;
 mod span;
 mod trace;
+mod tracing;
 
 pub use hemisphere::{Budget, Hemisphere, OverBudget, visible_fraction};
+pub use tracing::{at_point, at_vertex, at_vertices};

@@ -37,7 +37,7 @@ pub(super) struct Cones<const D: usize> {
     pub trusted: u8,
 }
 
-/// What the filter says of a direction.
+/// What the filter says of a direction and eight cones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Verdict {
     /// Cones that hold it.
@@ -61,7 +61,9 @@ impl<const D: usize> Cones<D> {
         let mut lengths = [zero; D];
         for i in 0..D {
             lengths[i] = edges[i][0].abs();
-            (1..D).for_each(|k| lengths[i] = lengths[i].add(edges[i][k].abs()));
+            for k in 1..D {
+                lengths[i] = lengths[i].add(edges[i][k].abs());
+            }
         }
         let normals = facet_normals(edges);
         let determinant = dot(&normals[0], &edges[0]);
@@ -73,7 +75,11 @@ impl<const D: usize> Cones<D> {
         }
         for i in 0..D {
             let mut bound = L::splat(ROUNDING);
-            (0..D).filter(|&j| j != i).for_each(|j| bound = bound.mul(lengths[j]));
+            for (j, &length) in lengths.iter().enumerate() {
+                if j != i {
+                    bound = bound.mul(length);
+                }
+            }
             let mut bound = bound.add(L::splat(UNDERFLOW));
             if i == 0 {
                 // 0 - x is negative for every x > 0, however small.
@@ -114,6 +120,40 @@ impl<const D: usize> Cones<D> {
         value
     }
 
+    /// Lanes that may hold a direction at all.
+    #[inline(always)]
+    pub fn live<L: Lanes>(&self) -> u8 {
+        !L::load(&self.bounds[0]).negative()
+    }
+
+    /// One of the cones against eight directions, given as rows of their components: those that are surely inside, and
+    /// those that may be.
+    #[inline(always)]
+    pub fn judge_eight<L: Lanes>(&self, lane: usize, directions: &[L; D]) -> [u8; 2] {
+        let mut least = L::splat(f32::INFINITY);
+        let mut greatest = L::splat(f32::NEG_INFINITY);
+        let mut most = 0.0f32;
+        for i in 0..D {
+            let bound = self.bounds[i][lane % WIDTH];
+            most = most.max(bound);
+            let mut value = L::splat(bound);
+            for k in 0..D {
+                value = L::splat(self.normals[i][k][lane % WIDTH]).mul_add(directions[k], value);
+            }
+            least = least.min(value);
+            greatest = greatest.max(value);
+        }
+        let most = L::splat(2.01 * most);
+        if self.trusted >> lane & 1 == 1 {
+            let outside = least.negative();
+            let inside = !least.less_or_equal(most);
+            [inside & !outside, !outside & !inside]
+        } else {
+            // Turned inwards or outwards.
+            [0, !least.negative() | greatest.less_or_equal(most)]
+        }
+    }
+
     /// The cones that may hold the direction. It is the same in all lanes, and no component exceeds 1 by more than
     /// rounding.
     #[inline(always)]
@@ -147,10 +187,33 @@ impl<const D: usize> Cones<D> {
     }
 }
 
+/// Whether the cones of these vectors hold a direction, the same in all lanes; for one direction this is less work than
+/// making [`Cones`]. `size` is a bound on the 1-norms of the vectors. Cones with a zero vector may be doubtful.
+#[inline(always)]
+pub(super) fn judge_once<L: Lanes, const D: usize>(edges: &[[L; D]; D], direction: &[L; D], size: f32) -> Verdict {
+    let normals = facet_normals(edges);
+    let determinant = dot(&normals[0], &edges[0]);
+    let value = dot(&normals[0], direction).turned_by(determinant);
+    let (mut least, mut greatest) = (value, value);
+    for normal in &normals[1..] {
+        let value = dot(normal, direction).turned_by(determinant);
+        least = least.min(value);
+        greatest = greatest.max(value);
+    }
+    let bound = ROUNDING * if D == 3 { size * size } else { size * size * size } + UNDERFLOW;
+    let unoriented = determinant.abs().less_or_equal(L::splat(bound * size + UNDERFLOW));
+    let outside = least.less_or_equal(L::splat(-bound));
+    let inside = !least.less_or_equal(L::splat(bound)) & !unoriented;
+    let turned_inside = unoriented & greatest.less_or_equal(L::splat(bound));
+    Verdict { inside, doubtful: (!outside | turned_inside) & !inside }
+}
+
 #[inline(always)]
 pub(super) fn dot<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> L {
     let mut sum = a[0].mul(b[0]);
-    (1..D).for_each(|k| sum = a[k].mul_add(b[k], sum));
+    for k in 1..D {
+        sum = a[k].mul_add(b[k], sum);
+    }
     sum
 }
 
@@ -158,6 +221,22 @@ pub(super) fn dot<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> L {
 #[inline(always)]
 fn minor<L: Lanes>(a: L, b: L, c: L, d: L) -> L {
     a.mul_sub(d, b.mul(c))
+}
+
+/// The minors of rows (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3).
+#[inline(always)]
+fn minors<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> [L; 6] {
+    let mut minors = [a[0]; 6];
+    for (m, (p, q)) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].into_iter().enumerate() {
+        minors[m] = minor(a[p], a[q], b[p], b[q]);
+    }
+    minors
+}
+
+/// a_0 m_0 - a_1 m_1 + a_2 m_2
+#[inline(always)]
+fn triple<L: Lanes>(a: [L; 3], m: [L; 3]) -> L {
+    a[2].mul_add(m[2], a[0].mul_sub(m[0], a[1].mul(m[1])))
 }
 
 /// For each i the vector n_i with `n_i . x = det[.. x in place of edge i ..]`.
@@ -174,20 +253,15 @@ fn facet_normals<L: Lanes, const D: usize>(edges: &[[L; D]; D]) -> [[L; D]; D] {
         }
     } else {
         // The 2 x 2 minors of the first two and of the last two edges serve two normals each.
-        let minors = |a: &[L; D], b: &[L; D]| {
-            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-            pairs.map(|(p, q)| minor(a[p], a[q], b[p], b[q]))
-        };
         let (first, last) = (minors(&edges[0], &edges[1]), minors(&edges[2], &edges[3]));
         let zero = L::splat(0.0);
         for i in 0..4 {
             let (a, [xy, xz, xw, yz, yw, zw]) = (&edges[i ^ 1], if i < 2 { last } else { first });
-            let triple = |p: L, m: L, q: L, n: L, r: L, o: L| r.mul_add(o, p.mul_sub(m, q.mul(n)));
             let n = [
-                triple(a[1], zw, a[2], yw, a[3], yz),
-                zero.sub(triple(a[0], zw, a[2], xw, a[3], xz)),
-                triple(a[0], yw, a[1], xw, a[3], xy),
-                zero.sub(triple(a[0], yz, a[1], xz, a[2], xy)),
+                triple([a[1], a[2], a[3]], [zw, yw, yz]),
+                zero.sub(triple([a[0], a[2], a[3]], [zw, xw, xz])),
+                triple([a[0], a[1], a[3]], [yw, xw, xy]),
+                zero.sub(triple([a[0], a[1], a[2]], [yz, xz, xy])),
             ];
             for k in 0..4 {
                 normals[i][k] = if i % 2 == 0 { n[k] } else { zero.sub(n[k]) };

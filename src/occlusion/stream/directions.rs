@@ -2,7 +2,7 @@
 //!
 //! These are the directions of [`Sequence::next_direction`], bit for bit: the same operations in the same order, without
 //! branches, so that the compiler works on several directions at once. Their order within a block differs, which a count
-//! does not notice: a nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
+//! does not notice. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
 //! taken in ascending order, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
 
 use super::super::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, scramble_reversed, sobol};
@@ -12,6 +12,17 @@ use crate::geometry::{Frame, Vector};
 
 /// Rays of a block; the bits of a `u64` name them.
 pub(super) const BLOCK: usize = 64;
+
+/// Groups of rays as wide as the lanes.
+pub(super) const GROUPS: usize = BLOCK / WIDTH;
+
+/// A cone that holds the directions of a group: its axis, and the cosine and sine of its half-angle, at most a right angle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GroupCone<const D: usize> {
+    pub axis: [f32; D],
+    pub cosine: f32,
+    pub sine: f32,
+}
 
 /// The first Sobol' points, each coordinate with its bits reversed.
 static SOBOL_BLOCK: [[u32; BLOCK]; 3] = sobol_block();
@@ -39,10 +50,14 @@ pub(super) struct Rays<const D: usize> {
     /// One over each component, which is taken for 1e-12 if it is smaller: over the extent of a scene that moves a ray
     /// by less than boxes are grown by.
     pub inverse: [[f32; BLOCK]; D],
+    /// The size of `inverse`.
+    pub absolute: [[f32; BLOCK]; D],
     /// The origin, in the coordinates of the boxes, times `inverse`.
     pub offset: [[f32; BLOCK]; D],
     /// The cosine to the normal.
     pub height: [f32; BLOCK],
+    /// Around the directions of each group.
+    pub cones: [GroupCone<D>; GROUPS],
 }
 
 impl<const D: usize> Rays<D> {
@@ -50,8 +65,10 @@ impl<const D: usize> Rays<D> {
         Self {
             direction: [[0.0; BLOCK]; D],
             inverse: [[0.0; BLOCK]; D],
+            absolute: [[0.0; BLOCK]; D],
             offset: [[0.0; BLOCK]; D],
             height: [0.0; BLOCK],
+            cones: [GroupCone { axis: [0.0; D], cosine: 0.0, sine: 1.0 }; GROUPS],
         }
     }
 
@@ -91,7 +108,7 @@ impl<const D: usize> Rays<D> {
                 sequence.next = sequence.next.wrapping_add(count as u32);
             }
         }
-        self.lift(&points, frame);
+        self.lift(&in_order::<D>(&points, count), frame);
     }
 
     /// Points of the cube onto the ball, onto the hemisphere, into the frame.
@@ -145,18 +162,118 @@ impl<const D: usize> Rays<D> {
                 let inverse = 1.0 / size.copysign(x);
                 self.direction[k][i] = x;
                 self.inverse[k][i] = inverse;
+                self.absolute[k][i] = inverse.abs();
                 self.offset[k][i] = origin[k] * inverse;
             }
         }
+        self.enclose();
     }
 
     /// The rays whose cosine to the normal is at most this.
     #[inline(always)]
     pub fn up_to_height<L: Lanes>(&self, height: f32) -> u64 {
-        let (rows, _) = self.height.as_chunks::<WIDTH>();
-        let masks = rows.iter().map(|row| u64::from(L::load(row).less_or_equal(L::splat(height))));
-        masks.enumerate().fold(0, |all, (n, mask)| all | mask << (n * WIDTH))
+        let mut mask = 0;
+        for (n, row) in self.height.as_chunks::<WIDTH>().0.iter().enumerate() {
+            mask |= u64::from(L::load(row).less_or_equal(L::splat(height))) << (n * WIDTH);
+        }
+        mask
     }
+
+    /// Finds the cones around the directions of the groups. Directions beyond `count` are left from before, and may be
+    /// zero; they only make a cone wider than it need be.
+    #[inline(always)]
+    fn enclose(&mut self) {
+        for group in 0..GROUPS {
+            let mut axis = [0.0f32; D];
+            let mut square = 0.0f32;
+            for k in 0..D {
+                for x in &self.direction[k].as_chunks::<WIDTH>().0[group] {
+                    axis[k] += x;
+                }
+                square += axis[k] * axis[k];
+            }
+            let factor = 1.0 / square.max(1e-10).sqrt();
+            let mut along = [0.0f32; WIDTH];
+            for k in 0..D {
+                axis[k] *= factor;
+                let row = &self.direction[k].as_chunks::<WIDTH>().0[group];
+                for i in 0..WIDTH {
+                    along[i] += axis[k] * row[i];
+                }
+            }
+            let mut cosine = 1.0f32;
+            for x in along {
+                cosine = if x < cosine { x } else { cosine };
+            }
+            // Rounding of products of unit vectors, and more. A cone wider than a half-space is all of space.
+            let cosine = cosine - 1e-5;
+            let sine = (1.0 - cosine * cosine).max(0.0).sqrt() + 1e-5;
+            self.cones[group] = if cosine > 0.0 {
+                GroupCone { axis, cosine, sine }
+            } else {
+                GroupCone { axis: [0.0; D], cosine: -1.0, sine: 1.0 }
+            };
+        }
+    }
+
+    /// The directions of a group.
+    #[inline(always)]
+    pub fn directions<L: Lanes>(&self, group: usize) -> [L; D] {
+        let mut directions = [L::splat(0.0); D];
+        for k in 0..D {
+            directions[k] = L::load(&self.direction[k].as_chunks().0[group]);
+        }
+        directions
+    }
+
+    /// The direction of a ray, in all lanes.
+    #[inline(always)]
+    pub fn splat<L: Lanes>(&self, i: usize) -> [L; D] {
+        let mut direction = [L::splat(0.0); D];
+        for k in 0..D {
+            direction[k] = L::splat(self.direction[k][i]);
+        }
+        direction
+    }
+}
+
+/// The points cell by cell of a grid of 64 cells along Morton's curve, so that neighbours in a block go to the same
+/// parts of the scene.
+#[inline(always)]
+fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize) -> [[f32; BLOCK]; 3] {
+    // Bits of the cells along an axis, spread apart to be joined.
+    const SPREAD_2: [u8; 8] = [0, 1, 4, 5, 16, 17, 20, 21];
+    const SPREAD_3: [u8; 4] = [0, 1, 8, 9];
+    let cell = |x: f32, cells: f32| ((x + 1.0) * (cells * 0.5)) as i32 as usize;
+    let mut keys = [0u8; BLOCK];
+    for i in 0..BLOCK {
+        keys[i] = if D == 4 {
+            let spread = |x: f32| SPREAD_3[cell(x, 4.0) % 4];
+            spread(points[0][i]) | spread(points[1][i]) << 1 | spread(points[2][i]) << 2
+        } else {
+            let spread = |x: f32| SPREAD_2[cell(x, 8.0) % 8];
+            spread(points[0][i]) | spread(points[1][i]) << 1
+        };
+    }
+    let mut ends = [0u8; BLOCK];
+    for &key in &keys[..count] {
+        ends[key as usize % BLOCK] += 1;
+    }
+    let mut sum = 0;
+    for end in &mut ends {
+        sum += *end;
+        *end = sum;
+    }
+    let mut ordered = [[0.0; BLOCK]; 3];
+    for (i, &key) in keys[..count].iter().enumerate() {
+        let end = &mut ends[key as usize % BLOCK];
+        *end -= 1;
+        let place = *end as usize % BLOCK;
+        for d in 0..D - 1 {
+            ordered[d][place] = points[d][i];
+        }
+    }
+    ordered
 }
 
 /// As [`Sequence::next_point`] makes a coordinate of bits; 24 of them fit a signed number.

@@ -9,7 +9,7 @@
 use super::cones::{Cones, dot};
 use super::directions::Rays;
 use super::lanes::Lanes;
-use super::traverse::Question;
+use super::question::Question;
 use crate::accel::WIDTH;
 use crate::geometry::Vector;
 use crate::occlusion::site::fold_cone;
@@ -57,17 +57,19 @@ impl<const D: usize> Fold<D> {
     #[inline(always)]
     fn set_block<L: Lanes>(&mut self, question: &Question<D>, simplices: &[u32]) -> f32 {
         let mesh = question.tracer.mesh();
-        let origin = question.wide.scale.scaled(&question.position);
         let mut rows = [[[0.0f32; WIDTH]; D]; D];
         for lane in 0..WIDTH {
             let simplex = mesh.simplices[simplices[lane.min(simplices.len() - 1)] as usize];
             let others = simplex.into_iter().filter(|&v| mesh.identity[v as usize] != self.identity);
             for (row, vertex) in rows.iter_mut().zip(others) {
-                let edge = question.wide.scale.scaled(&mesh.vertices[vertex as usize]) - origin;
+                let edge = question.wide.scale.scaled(&mesh.vertices[vertex as usize]) - question.scaled;
                 (0..D).for_each(|k| row[k][lane] = edge[k]);
             }
         }
-        let normal: [L; D] = std::array::from_fn(|k| L::splat(self.normal[k]));
+        let mut normal = [L::splat(0.0); D];
+        for k in 0..D {
+            normal[k] = L::splat(self.normal[k]);
+        }
         let mut edges = [[L::splat(0.0); D]; D];
         let (mut surely, mut maybe) = (L::splat(-1.0), L::splat(-1.0));
         for (i, edge) in edges.iter_mut().enumerate() {
@@ -76,7 +78,10 @@ impl<const D: usize> Fold<D> {
             }
             if i < D - 1 {
                 let height = dot(edge, &normal);
-                let length = edge.iter().fold(L::splat(0.0), |sum, x| sum.add(x.abs()));
+                let mut length = L::splat(0.0);
+                for x in edge.iter() {
+                    length = length.add(x.abs());
+                }
                 let bound = length.mul(L::splat(HEIGHT_ROUNDING));
                 surely = surely.max(height.sub(bound));
                 maybe = maybe.max(height.add(bound));
@@ -108,7 +113,7 @@ impl<const D: usize> Fold<D> {
         while low != 0 {
             let i = low.trailing_zeros() as usize;
             low &= low - 1;
-            let direction = std::array::from_fn(|k| L::splat(rays.direction[k][i]));
+            let direction = rays.splat::<L>(i);
             for (cones, simplices) in self.cones[..self.count].iter().zip(around.chunks(WIDTH)) {
                 let candidates = cones.candidates::<L>(&direction);
                 if candidates == 0 {

@@ -43,7 +43,8 @@ impl Level {
     }
 }
 
-/// Eight numbers. A mask has the bit of each lane, lane 0 lowest.
+/// Eight numbers. Code that is generic over them must be inlined into the function compiled for the level, so it uses plain
+/// loops: a closure handed to an iterator is compiled apart, without the level's instructions. A mask has the bit of each lane, lane 0 lowest.
 pub(super) trait Lanes: Copy {
     fn load(row: &Row) -> Self;
     fn store(self, row: &mut Row);
@@ -55,9 +56,12 @@ pub(super) trait Lanes: Copy {
     fn mul_add(self, factor: Self, term: Self) -> Self;
     /// `self * factor - term`, rounded once or twice.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
+    /// `term - self * factor`, rounded once or twice.
+    fn negated_mul_add(self, factor: Self, term: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
+    fn square_root(self) -> Self;
     /// Each lane with its sign turned where `sign` is negative.
     fn turned_by(self, sign: Self) -> Self;
     /// The lanes of `negative` where the sign bit of `self` is set, of `other` where it isn't.
@@ -65,9 +69,12 @@ pub(super) trait Lanes: Copy {
     /// Lanes with the sign bit set.
     fn negative(self) -> u8;
     fn less_or_equal(self, other: Self) -> u8;
-    /// Writes those of the eight words that the mask names, each with `tag` in its low bits, side by side to the
-    /// front of `out`; what follows them there is overwritten too. Returns how many.
+    /// Writes those of the eight words that the mask names, each with `tag` in its low bits, side by side to the front
+    /// of `out`; what follows them there is overwritten too. Returns how many.
     fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize;
+    /// Starts to bring an item into the cache.
+    #[inline(always)]
+    fn fetch<T>(_items: &[T], _index: u32) {}
 }
 
 /// Plain arrays.
@@ -122,6 +129,11 @@ impl Lanes for Portable {
         self.mul(factor).sub(term)
     }
 
+    #[inline(always)]
+    fn negated_mul_add(self, factor: Self, term: Self) -> Self {
+        term.sub(self.mul(factor))
+    }
+
     // Comparisons, not `f32::min`: there are no NaNs to mind, and this is one instruction.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
@@ -136,6 +148,11 @@ impl Lanes for Portable {
     #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.map(f32::abs))
+    }
+
+    #[inline(always)]
+    fn square_root(self) -> Self {
+        Self(self.0.map(f32::sqrt))
     }
 
     #[inline(always)]

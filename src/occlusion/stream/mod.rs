@@ -8,12 +8,15 @@
 //! - [`directions`]: the rays of a shading point, 64 at a time;
 //! - [`fold`]: what the simplices around a vertex hide;
 //! - [`traverse`]: the rays through the [`crate::accel::WideBvh`];
+//! - [`leaves`]: the rays against the simplices of a leaf;
 //! - [`cones`]: eight simplices as cones seen from the shading point.
 
 mod cones;
 mod directions;
 mod fold;
 mod lanes;
+mod leaves;
+mod question;
 mod traverse;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -23,7 +26,8 @@ pub use lanes::Level;
 use directions::{BLOCK, Rays};
 use fold::Fold;
 use lanes::{Lanes, Portable};
-use traverse::{Question, Traversal};
+use question::Question;
+use traverse::Traversal;
 
 use super::{Sequence, Settings, Site, ambient_occlusion};
 use crate::accel::Tracer;
@@ -72,7 +76,7 @@ impl<const D: usize> Stream<D> {
             let site = Site::at_vertex(tracer, incidence, vertex);
             return ambient_occlusion(tracer, &site, settings, u64::from(vertex));
         }
-        let question = Question::new(tracer, position, settings.max_distance, None);
+        let question = Question::new(tracer, position, normal, settings.max_distance, None);
         let source = Source::Sequence {
             sequence: Sequence::new(settings.sampler, settings.seed, u64::from(vertex)),
             frame: Frame::new(&normal),
@@ -84,11 +88,13 @@ impl<const D: usize> Stream<D> {
     }
 
     /// How many of the rays from a point in these directions, each of length 1, hit a simplex other than `ignored`
-    /// within `limit`; as [`Tracer::occluded`] tells ray by ray.
+    /// within `limit`; as [`Tracer::occluded`] tells ray by ray. If the directions are those of a hemisphere, its
+    /// middle as `normal` saves work; else it may be zero.
     pub fn count_occluded(
         &mut self,
         tracer: &Tracer<D>,
         origin: &Vector<D>,
+        normal: Vector<D>,
         directions: &[Vector<D>],
         limit: f32,
         ignored: Option<u32>,
@@ -97,7 +103,10 @@ impl<const D: usize> Stream<D> {
             let rays = directions.iter().map(|d| crate::geometry::Ray::new(*origin, *d));
             return rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
         }
-        let question = Question::new(tracer, *origin, limit, ignored);
+        // Left out only if all rays surely are on its side.
+        let on_side = directions.iter().all(|d| d.dot(&normal) > 1e-5);
+        let normal = if on_side { normal } else { Vector::zeros() };
+        let question = Question::new(tracer, *origin, normal, limit, ignored);
         self.blocked(&question, None, &[], Source::Directions(directions))
     }
 
@@ -161,8 +170,6 @@ fn blocked<L: Lanes, const D: usize>(
         Some((normal, identity)) => stream.fold.set::<L>(question, normal, identity, around),
         None => stream.fold.clear(),
     }
-    stream.traversal.move_origin();
-    let origin = question.wide.scale.centred(&question.position);
     let total = match &source {
         Source::Sequence { samples, .. } => *samples as usize,
         Source::Directions(directions) => directions.len(),
@@ -174,7 +181,7 @@ fn blocked<L: Lanes, const D: usize>(
             Source::Sequence { sequence, frame, .. } => stream.rays.take(sequence, frame, count),
             Source::Directions(directions) => stream.rays.set(&directions[first..first + count]),
         }
-        stream.rays.start_from(&origin);
+        stream.rays.start_from(&question.centred);
         let alive = u64::MAX >> (BLOCK - count);
         let hidden = stream.fold.hidden::<L>(question, &stream.rays, around, alive);
         let hit = stream.traversal.blocked::<L>(question, &stream.rays, alive & !hidden);

@@ -81,6 +81,12 @@ macro_rules! arithmetic {
         }
 
         #[inline(always)]
+        fn negated_mul_add(self, factor: Self, term: Self) -> Self {
+            // SAFETY: FMA by the level.
+            Self(unsafe { _mm256_fnmadd_ps(self.0, factor.0, term.0) })
+        }
+
+        #[inline(always)]
         fn min(self, other: Self) -> Self {
             // SAFETY: AVX by the level.
             Self(unsafe { _mm256_min_ps(self.0, other.0) })
@@ -96,6 +102,21 @@ macro_rules! arithmetic {
         fn abs(self) -> Self {
             // SAFETY: AVX by the level.
             Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+        }
+
+        #[inline(always)]
+        fn fetch<T>(items: &[T], index: u32) {
+            let start = items.as_ptr().wrapping_add(index as usize).cast::<i8>();
+            for line in 0..size_of::<T>().div_ceil(64) {
+                // SAFETY: SSE by the level; a prefetch may be of any address.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
+            }
+        }
+
+        #[inline(always)]
+        fn square_root(self) -> Self {
+            // SAFETY: AVX by the level.
+            Self(unsafe { _mm256_sqrt_ps(self.0) })
         }
 
         #[inline(always)]

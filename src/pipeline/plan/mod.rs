@@ -32,11 +32,13 @@ use super::error::Invalid;
 use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading};
 
 /// The methods of occlusion that this version has.
-pub const METHODS: &[Method] = &[Method::Sobol, Method::Random];
+pub const METHODS: &[Method] = &[Method::Sobol, Method::Random, Method::Exact];
 /// Whether this version can aim at an error instead of a number of samples.
 pub const HAS_TARGET_ERROR: bool = false;
 /// The most samples a vertex.
 pub const MAX_SAMPLES: u64 = 1 << 24;
+/// The most pieces that a vertex's view may be cut into.
+pub const MAX_CONES: u64 = 1_000_000_000;
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
 /// The most objects in a scene: the `object` array numbers them with 16 bits, and 0 is the background.
@@ -212,6 +214,9 @@ pub struct Computation {
     pub method: Method,
     /// With how many rays.
     pub samples: Samples,
+    /// For `exact`: the most convex pieces a vertex. No value depends on it.
+    #[serde(skip)]
+    pub max_cones: u64,
     /// Occluders further away don't count.
     pub max_distance: Option<f64>,
     /// What its random numbers start from.

@@ -3,9 +3,10 @@
 use super::range::positive;
 use super::resolve::Resolver;
 use super::{
-    Computation, HAS_TARGET_ERROR, MAX_OBJECTS, MAX_SAMPLES, METHODS, NO_SCENE, OcclusionPlan, OcclusionSource,
-    Samples, ScenePlan, StageRef,
+    Computation, HAS_TARGET_ERROR, MAX_CONES, MAX_OBJECTS, MAX_SAMPLES, METHODS, NO_SCENE, OcclusionPlan,
+    OcclusionSource, Samples, ScenePlan, StageRef,
 };
+use crate::occlusion::exact;
 use crate::pipeline::error::Invalid;
 use crate::pipeline::spec::{Method, OcclusionSpec, SceneSpec};
 
@@ -83,6 +84,7 @@ fn written(spec: &OcclusionSpec) -> impl Iterator<Item = &'static str> {
         ("samples", spec.samples.is_some()),
         ("target_error", spec.target_error.is_some()),
         ("max_samples", spec.max_samples.is_some()),
+        ("max_cones", spec.max_cones.is_some()),
         ("max_distance", spec.max_distance.is_some()),
         ("seed", spec.seed.is_some()),
     ]
@@ -126,9 +128,21 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
     } else {
         samples
     };
+    let max_cones = match spec.max_cones {
+        None => exact::Budget::default().cones as u64,
+        Some(n @ 1..=MAX_CONES) => n,
+        Some(n) => return refuse("max_cones", format!("expected 1 to {MAX_CONES} cones, found {n}")),
+    };
+    if spec.max_cones.is_some() && method != Method::Exact {
+        resolver.warn(format!("{path}.max_cones"), "has no effect without `method: exact`");
+    }
+    if spec.max_distance.is_some() && method == Method::Exact {
+        let message = "`exact` has its closed form for all distances only; leave this out, or use `method: sobol`";
+        return refuse("max_distance", message.into());
+    }
     let distance = spec.max_distance.map(|d| positive(&format!("{path}.max_distance"), d));
     let seed = spec.seed.unwrap_or(resolver.plan.seed);
-    Ok(Computation { method, samples, max_distance: distance.transpose()?, seed })
+    Ok(Computation { method, samples, max_cones, max_distance: distance.transpose()?, seed })
 }
 
 impl Method {

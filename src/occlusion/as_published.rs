@@ -1,0 +1,290 @@
+//! The algorithm as the thesis published it (Djami 2021, 2.1.2, 2.3, 4.3, 4.4 and 4.6.3), slips and all, to show what its
+//! figures show: objects that are fully occluded, or not at all. Not for any other use.
+//!
+//! Of a vertex O, in `f32` throughout:
+//!
+//! 1. The normal is the sum of the formal determinants (4.4) of the edges of its simplices, in their vertices' order.
+//! 2. Points of the unit sphere around O come from angles (Eq. 2.9, 4.5), the first uniform in [0, 2 pi], the others in
+//!    [0, pi]. Directions with w . n <= 0 are thrown away. The angles are uniform, the directions are not.
+//! 3. A ray hits a simplex if Cramer's rule for `O - A = -t w + l_2 (B - A) + l_3 (C - A) + ...` gives t >= 0 and no negative
+//!    l_i, with l_1 = 1 - l_2 - ...; determinants by Laplace's expansion along their first row.
+//! 4. Occlusion is the share of the rays that hit something. The cosine of Eq. 2.8 is left out.
+//!
+//! The slip that makes all or nothing is the third. The vertex's own simplices are tested like any other, and there t is 0:
+//! - for A, as O - A = 0, all numerators are exactly 0: every ray hits, the vertex is fully occluded;
+//! - for other vertices O - A equals another column. Products cancel exactly where the expansion subtracts them from each
+//!   other, and leave rounding noise where it sums them in another order: then the sign of noise decides. The noise in t
+//!   is the same for all rays of the vertex, so they all hit, or all miss.
+//!
+//! What the compiler makes of a sum thus decides between black and white. OpenCL lets it fuse products into sums unless
+//! forbidden; [`Slips::contracted`] does that, and other vertices change sides.
+//!
+//! Each slip is a switch of its own ([`Slips`]); with all of them off the truth is left. The hierarchy is used to save time:
+//! hits that rounding finds outside a simplex's box aren't seen.
+
+use rayon::prelude::*;
+
+use super::{Cancelled, Sampler, Sequence, Settings, Site};
+use crate::accel::Tracer;
+use crate::geometry::{Frame, Ray, Vector};
+use crate::mesh::Incidence;
+use crate::progress::Progress;
+
+/// What the published algorithm does otherwise than it should. Each can be taken back by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slips {
+    /// Angles drawn uniformly, and no cosine: neither the density of the integral nor that of the sphere. Without it
+    /// directions are cosine-weighted.
+    pub uniform_angles: bool,
+    /// A hit at t = 0 counts. Without it t must be above 0.
+    pub hits_at_zero: bool,
+    /// The simplices that a vertex belongs to are tested like others. Without it they hide the cone of their edges and the
+    /// inverted normal, which is what is left of them as the point moves off the surface.
+    pub own_simplices: bool,
+    /// Cramer's rule in `f32`. Without it signs are exact, whatever the following two say.
+    pub single_precision: bool,
+    /// Products are fused into sums, as OpenCL compilers may. Not a slip in the text.
+    pub contracted: bool,
+    /// Eq. 2.7 and 4.3 as printed: t counts backwards, and A's first coordinate is subtracted in rows where it doesn't
+    /// belong. No program with this in it shows a scene, so it is a slip of the printed text alone.
+    pub printed_equations: bool,
+}
+
+impl Slips {
+    /// The algorithm as its text describes it.
+    pub const PUBLISHED: Self = Self {
+        uniform_angles: true,
+        hits_at_zero: true,
+        own_simplices: true,
+        single_precision: true,
+        contracted: false,
+        printed_equations: false,
+    };
+
+    /// All slips taken back.
+    pub const NONE: Self = Self {
+        uniform_angles: false,
+        hits_at_zero: false,
+        own_simplices: false,
+        single_precision: false,
+        ..Self::PUBLISHED
+    };
+}
+
+/// The value 1 - occlusion at every vertex, by `settings.samples` rays each; `settings.sampler` isn't asked.
+///
+/// # Errors
+/// [`Cancelled`] if `progress` says so.
+pub fn as_published<const D: usize>(
+    tracer: &Tracer<D>,
+    slips: Slips,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Vec<f32>, Cancelled> {
+    let mesh = tracer.mesh();
+    let incidence = Incidence::new(mesh);
+    let normals = normals(tracer);
+    let value = |(vertex, normal): (usize, &Vector<D>)| {
+        if progress.cancelled() {
+            return Err(Cancelled);
+        }
+        let own = (!slips.own_simplices).then(|| Site::at_vertex(tracer, &incidence, vertex as u32));
+        let value = Published { tracer, slips, own }.value(vertex as u32, normal, settings);
+        progress.advance(1);
+        Ok(value)
+    };
+    normals.par_iter().enumerate().map(value).collect()
+}
+
+/// The unit normals by the formal determinants of the simplices' edges, in the order of their vertices; zero where there
+/// are none.
+fn normals<const D: usize>(tracer: &Tracer<D>) -> Vec<Vector<D>> {
+    let mesh = tracer.mesh();
+    let mut sums = vec![Vector::<D>::zeros(); mesh.vertices.len()];
+    for simplex in &mesh.simplices {
+        let corners = simplex.map(|v| mesh.vertices[v as usize]);
+        let normal = Vector::from_fn(|axis, _| {
+            // The formal determinant's first column holds the unit vectors.
+            let unit = Vector::from_fn(|r, _| if r == axis { 1.0 } else { 0.0 });
+            let columns = std::array::from_fn(|i| if i == 0 { unit } else { corners[i] - corners[0] });
+            laplace(&columns, false)
+        });
+        simplex.iter().for_each(|&v| sums[v as usize] += normal);
+    }
+    sums.iter().map(|sum| sum.try_normalize(0.0).unwrap_or_else(Vector::zeros)).collect()
+}
+
+/// One vertex's question.
+struct Published<'t, const D: usize> {
+    tracer: &'t Tracer<'t, D>,
+    slips: Slips,
+    /// What the vertex's own simplices hide, where they aren't tested like others.
+    own: Option<Site<D>>,
+}
+
+impl<const D: usize> Published<'_, D> {
+    fn value(&self, vertex: u32, normal: &Vector<D>, settings: &Settings) -> f32 {
+        let mut sequence = Sequence::new(Sampler::Random, settings.seed, u64::from(vertex));
+        if normal.amax() == 0.0 {
+            return 1.0;
+        }
+        let origin = self.tracer.mesh().vertices[vertex as usize];
+        let frame = Frame::new(normal);
+        let (mut rays, mut hits) = (0u32, 0u32);
+        // About every second direction is on the normal's side; where rounding leaves none, there is no value.
+        for _ in 0..settings.samples.saturating_mul(64) {
+            let direction = if self.slips.uniform_angles {
+                let point = origin + sphere_point(&mut sequence);
+                point - origin
+            } else {
+                sequence.next_direction(&frame)
+            };
+            if direction.dot(normal) <= 0.0 {
+                continue;
+            }
+            rays += 1;
+            hits += u32::from(self.hits_something(&Ray::new(origin, direction), settings.max_distance));
+            if rays == settings.samples {
+                break;
+            }
+        }
+        1.0 - (f64::from(hits) / f64::from(rays.max(1))) as f32
+    }
+
+    fn hits_something(&self, ray: &Ray<D>, limit: f32) -> bool {
+        let mesh = self.tracer.mesh();
+        if self.own.as_ref().is_some_and(|own| own.hides(ray)) {
+            return true;
+        }
+        self.tracer.bvh().any(ray, limit, |simplex| {
+            let corners = mesh.corners(simplex);
+            if self.own.is_some() && corners.contains(&ray.origin) {
+                return false;
+            }
+            if !self.slips.single_precision {
+                return self.tracer.hits(simplex, ray, limit);
+            }
+            let (t, weights) = cramer(&corners, ray, self.slips);
+            let ahead = if self.slips.hits_at_zero { t >= 0.0 } else { t > 0.0 };
+            ahead && t <= limit && weights.iter().all(|&w| w >= 0.0)
+        })
+    }
+}
+
+/// A point of the unit sphere around the origin, from angles (Eq. 2.9, 4.5).
+fn sphere_point<const D: usize>(sequence: &mut Sequence) -> Vector<D> {
+    let angles = sequence.next_point::<3>().map(|x| (x + 1.0) * std::f32::consts::FRAC_PI_2);
+    let mut point = Vector::<D>::zeros();
+    let mut product = 1.0;
+    for i in 0..D - 1 {
+        let angle = if i == 0 { 2.0 * angles[0] } else { angles[i] };
+        point[i] = product * libm::cosf(angle);
+        product *= libm::sinf(angle);
+    }
+    point[D - 1] = product;
+    point
+}
+
+/// The distance and the barycentric coordinates, by Cramer's rule.
+fn cramer<const D: usize>(corners: &[Vector<D>; D], ray: &Ray<D>, slips: Slips) -> (f32, [f32; D]) {
+    let a = corners[0];
+    let mut columns: [Vector<D>; D] = std::array::from_fn(|i| if i == 0 { -ray.direction } else { corners[i] - a });
+    let mut right = ray.origin - a;
+    if slips.printed_equations {
+        columns[0] = ray.direction;
+        if D == 4 {
+            columns[3] = corners[3].map(|x| x - a[0]);
+            right[1] = ray.origin[1] - a[0];
+        }
+    }
+    let denominator = laplace(&columns, slips.contracted);
+    let solution: [f32; D] = std::array::from_fn(|i| {
+        let column = std::mem::replace(&mut columns[i], right);
+        let numerator = laplace(&columns, slips.contracted);
+        columns[i] = column;
+        numerator / denominator
+    });
+    let mut weights = solution;
+    weights[0] = solution[1..].iter().fold(1.0, |rest, l| rest - l);
+    (solution[0], weights)
+}
+
+/// A determinant by Laplace's expansion along the first row, and so on down to 2 x 2.
+fn laplace<const D: usize>(columns: &[Vector<D>; D], contracted: bool) -> f32 {
+    let all = [0, 1, 2, 3];
+    minor(columns, 0, &all[..D], contracted)
+}
+
+fn minor<const D: usize>(columns: &[Vector<D>; D], row: usize, kept: &[usize], contracted: bool) -> f32 {
+    // a - b c, rounded once or twice.
+    let subtract = |a: f32, b: f32, c: f32| if contracted { (-b).mul_add(c, a) } else { a - b * c };
+    if let &[i, j] = kept {
+        let (first, second) = (&columns[i], &columns[j]);
+        let product = second[row] * first[row + 1];
+        return if contracted {
+            first[row].mul_add(second[row + 1], -product)
+        } else {
+            first[row] * second[row + 1] - product
+        };
+    }
+    let mut sum = 0.0;
+    for (k, &column) in kept.iter().enumerate() {
+        let mut rest = [0; 3];
+        let others = kept.iter().filter(|&&c| c != column);
+        rest.iter_mut().zip(others).for_each(|(place, &c)| *place = c);
+        let value = minor(columns, row + 1, &rest[..kept.len() - 1], contracted);
+        let entry = columns[column][row];
+        sum = match k {
+            0 => entry * value,
+            _ if k % 2 == 1 => subtract(sum, entry, value),
+            _ => subtract(sum, -entry, value),
+        };
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{determinant, widen};
+
+    fn determinants<const D: usize>() {
+        let mut sequence = Sequence::new(Sampler::Random, 3, 4);
+        for contracted in [false, true] {
+            for _ in 0..100 {
+                let columns: [Vector<D>; D] = std::array::from_fn(|_| {
+                    let p = sequence.next_point::<4>();
+                    Vector::from_fn(|i, _| p[i])
+                });
+                let expected = determinant(&columns.map(|c| widen(&c)));
+                assert!((f64::from(laplace(&columns, contracted)) - expected).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn laplace_gives_determinants() {
+        determinants::<3>();
+        determinants::<4>();
+    }
+
+    #[test]
+    fn cramer_finds_the_crossing() {
+        let corners: [Vector<4>; 4] = std::array::from_fn(|i| Vector::from_fn(|r, _| if r == i { 2.0 } else { 0.0 }));
+        let ray = Ray::new(Vector::zeros(), Vector::from([0.25, 0.25, 0.5, 0.5]));
+        let (t, weights) = cramer(&corners, &ray, Slips::PUBLISHED);
+        assert!((t - 4.0 / 3.0).abs() < 1e-6, "{t}");
+        let expected = [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0];
+        assert!(weights.iter().zip(expected).all(|(w, e): (&f32, f32)| (w - e).abs() < 1e-6), "{weights:?}");
+        let printed = Slips { printed_equations: true, ..Slips::PUBLISHED };
+        assert!(cramer(&corners, &ray, printed).0 < 0.0, "t counts backwards");
+    }
+
+    #[test]
+    fn angles_miss_the_density() {
+        // On the sphere of R^4 the mean of |x_1| is 4 / (3 pi); by uniform angles it is 2 / pi.
+        let mut sequence = Sequence::new(Sampler::Random, 1, 1);
+        let mean = (0..20_000).map(|_| sphere_point::<4>(&mut sequence)[0].abs()).sum::<f32>() / 20_000.0;
+        assert!((mean - 2.0 / std::f32::consts::PI).abs() < 0.01, "{mean}");
+    }
+}

@@ -1,0 +1,256 @@
+//! Isosurfaces: where a field, given by a formula or as a grid of values, passes a value.
+//!
+//! [`table`] says what the surface is within one cell of a grid, [`march`] goes over all cells, [`field`] and [`expression`]
+//! make fields of formulas. For D = 4 that is marching hypercubes, for D = 3 marching cubes. The surface
+//! is piecewise linear and converges with the square of the cells' size. Around the grid is nothing, if `pad` is not
+//! switched off, so that a body that reaches beyond the grid is cut off flat there, a fiftieth of a cell outside of it, and
+//! the surface is closed in any case.
+
+mod components;
+mod expression;
+pub mod field;
+pub mod march;
+pub mod table;
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use self::expression::{Expression, Rows};
+use self::field::Field;
+use self::march::{Layers, Stop};
+use super::Error;
+use super::lattice::divide;
+use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, check_count, finite};
+use crate::mesh::Surface;
+
+/// The most points a layer of a grid may have: three layers are held in memory.
+const MOST_IN_LAYER: u128 = 1 << 27;
+
+/// The most points of a grid: more would take minutes only to look at.
+const MOST_POINTS: u128 = 1 << 33;
+
+/// The surface where a field passes a value.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IsosurfaceSpec {
+    /// The field.
+    pub field: Field,
+    /// Where the field is looked at.
+    pub grid: GridSpec,
+    /// The value that the surface is at; 0 if left out.
+    #[serde(default)]
+    pub isovalue: Option<f64>,
+    /// Which side of the isovalue is solid; `below` if left out.
+    #[serde(default)]
+    pub inside: Option<Side>,
+    /// Whether to close the surface where it leaves the grid; yes if left out.
+    #[serde(default = "yes")]
+    pub pad: bool,
+    /// Leaves out what is connected and has fewer simplices than this.
+    #[serde(default)]
+    pub smallest_component: Option<u64>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Which side of the isovalue is solid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Where the field is less, as with distances.
+    Below,
+    /// Where the field is more, as with densities.
+    Above,
+}
+
+/// A grid of points at which a formula is looked at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridSpec {
+    /// The lowest corner, one number an axis. A named body that has an end needs neither corner.
+    #[serde(default)]
+    pub min: Option<Vec<f64>>,
+    /// The highest corner, one number an axis.
+    #[serde(default)]
+    pub max: Option<Vec<f64>>,
+    /// Cells along every axis, or a list with one number an axis.
+    pub cells: OneOrEach<u32>,
+}
+
+impl IsosurfaceSpec {
+    /// The surface.
+    pub fn build<const D: usize>(&self) -> Result<Surface<D>, Error> {
+        let isovalue = finite("isosurface.isovalue", self.isovalue.unwrap_or(0.0))?;
+        let inside = self.inside.unwrap_or(Side::Below);
+        let definition = self.field.define(D)?;
+        let formula_key = format!("isosurface.field.{}", self.field.key());
+        let expression = Expression::parse(&definition.formula, &AXES[..D])
+            .map_err(|message| Error::invalid(&formula_key, message))?;
+        // A body grows by the isovalue, as its field is a distance.
+        let reach = definition.extent.map(|extent| extent.map(|x| x + isovalue.max(0.0)));
+        let axes = self.grid.axes::<D>(reach)?;
+        let mut sampled = Sampled {
+            rows: expression.along(&axes[0]),
+            axes: axes.clone(),
+            layer: 0,
+            isovalue,
+            sign: if inside == Side::Below { -1.0 } else { 1.0 },
+            seen: Seen::default(),
+        };
+        let surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut sampled);
+        finish(surface, &sampled.seen, isovalue, self.smallest_component)
+    }
+}
+
+/// What all isosurfaces end with: is there anything, and what is large enough to stay.
+fn finish<const D: usize>(
+    surface: Result<Surface<D>, Stop<Error>>,
+    seen: &Seen,
+    isovalue: f64,
+    smallest: Option<u64>,
+) -> Result<Surface<D>, Error> {
+    let surface = match surface {
+        Ok(surface) => surface,
+        Err(Stop::Field(error)) => return Err(error),
+        Err(Stop::TooMany) => {
+            let message = format!(
+                "the surface has more than {MAX_SIMPLICES} simplices, the most that one object may have; \
+                 take fewer cells, or another isovalue if the field is noise there"
+            );
+            return Err(Error::invalid("isosurface", message));
+        }
+    };
+    if seen.inside == 0 || seen.outside == 0 {
+        let all = if seen.inside == 0 { "out" } else { "in" };
+        let range = match seen.lowest <= seen.highest {
+            true => format!("its values go from {} to {}", seen.lowest, seen.highest),
+            false => "none of its values is a number".to_owned(),
+        };
+        let message = format!("the field is {all}side everywhere: {range}, and the isovalue is {isovalue}");
+        return Err(Error::invalid("isosurface.isovalue", message));
+    }
+    let surface = match smallest {
+        None => surface,
+        Some(smallest) => components::at_least(surface, smallest),
+    };
+    if surface.simplices.is_empty() && smallest.is_some() {
+        let message = "no component of the surface has that many simplices";
+        return Err(Error::invalid("isosurface.smallest_component", message));
+    }
+    Ok(surface)
+}
+
+impl GridSpec {
+    /// The positions of the points along each axis.
+    fn axes<const D: usize>(&self, reach: Option<[f64; 4]>) -> Result<[Vec<f64>; D], Error> {
+        let cells = self.cells.each::<D>("isosurface.grid.cells")?;
+        if cells.contains(&0) {
+            return Err(Error::invalid("isosurface.grid.cells", "0 cells; the least is 1"));
+        }
+        check_grid("isosurface.grid.cells", &cells.map(|n| u128::from(n) + 1))?;
+        let (min, max) = match (&self.min, &self.max, reach) {
+            (Some(min), Some(max), _) => bounds("isosurface.grid", ("min", min), ("max", max))?,
+            (None, None, Some(reach)) => {
+                // One cell of room on each side, or a tenth of the body where that is less.
+                let room = |axis: usize| reach[axis] * (1.0 + (2.0 / f64::from(cells[axis])).min(0.1));
+                let max = crate::geometry::Vector64::<D>::from_fn(|axis, _| room(axis));
+                (-max, max)
+            }
+            (None, None, None) => {
+                return Err(Error::invalid("isosurface.grid", "needs min and max: the field has no end of its own"));
+            }
+            _ => return Err(Error::invalid("isosurface.grid", "has only one of min and max; give both or neither")),
+        };
+        Ok(std::array::from_fn(|axis| divide(min[axis], max[axis], cells[axis]).chain([max[axis]]).collect()))
+    }
+}
+
+/// Refuses a grid that is too large to march over.
+fn check_grid<const D: usize>(key: &str, points: &[u128; D]) -> Result<(), Error> {
+    let layer: u128 = points[..D - 1].iter().product();
+    let total = layer * points[D - 1];
+    if layer > MOST_IN_LAYER || total > MOST_POINTS {
+        let message = format!(
+            "the grid has {total} points, {layer} in a layer; the most is {MOST_POINTS}, and {MOST_IN_LAYER} in a layer"
+        );
+        return Err(Error::invalid(key, message));
+    }
+    check_count(key, 0)
+}
+
+/// What was met of a field.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    lowest: f64,
+    highest: f64,
+    inside: u64,
+    outside: u64,
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        Self { lowest: f64::INFINITY, highest: f64::NEG_INFINITY, inside: 0, outside: 0 }
+    }
+}
+
+impl Seen {
+    fn and(self, other: Self) -> Self {
+        Self {
+            lowest: self.lowest.min(other.lowest),
+            highest: self.highest.max(other.highest),
+            inside: self.inside + other.inside,
+            outside: self.outside + other.outside,
+        }
+    }
+
+    /// Notes a value, and returns how far it is inside.
+    #[inline]
+    fn look(&mut self, value: f64, isovalue: f64, sign: f64) -> f32 {
+        self.lowest = self.lowest.min(value);
+        self.highest = self.highest.max(value);
+        let depth = (sign * (value - isovalue)) as f32;
+        let inside = depth >= 0.0;
+        self.inside += u64::from(inside);
+        self.outside += u64::from(!inside);
+        depth
+    }
+}
+
+/// A formula, looked at layer by layer.
+struct Sampled<const D: usize> {
+    rows: Rows,
+    axes: [Vec<f64>; D],
+    layer: usize,
+    isovalue: f64,
+    sign: f64,
+    seen: Seen,
+}
+
+impl<const D: usize> Layers for Sampled<D> {
+    type Error = Error;
+
+    fn next(&mut self, values: &mut [f32]) -> Result<(), Error> {
+        let Self { rows, axes, layer, isovalue, sign, seen } = self;
+        let width = axes[0].len();
+        let row_of = |mut row: usize, at: &mut [f64; 3]| {
+            for axis in 1..D - 1 {
+                at[axis - 1] = axes[axis][row % axes[axis].len()];
+                row /= axes[axis].len();
+            }
+            at[D - 2] = axes[D - 1][*layer];
+        };
+        let look = |buffers: &mut Vec<Vec<f64>>, (row, values): (usize, &mut [f32])| {
+            let (mut at, mut seen) = ([0.0; 3], Seen::default());
+            row_of(row, &mut at);
+            rows.evaluate(&at[..D - 1], buffers, |x, value| values[x] = seen.look(value, *isovalue, *sign));
+            seen
+        };
+        let all = values.par_chunks_mut(width).enumerate().with_min_len(16);
+        *seen = seen.and(all.map_init(Vec::new, look).reduce(Seen::default, Seen::and));
+        *layer += 1;
+        Ok(())
+    }
+}
