@@ -29,7 +29,7 @@ fn interrupted_runs_leave_nothing_behind() {
     for (what, shape, sets) in [
         ("occlusion", sphere, &["ao.samples=16384"][..]),
         ("picture", body, &["image.dimensions=[400, 400, 400]", "plain.dimensions=[400, 400, 400]", "ao.samples=1"]),
-        ("voxel", body, &["image.shading=voxel", "image.dimensions=[400, 8, 8]", "ao.samples=10000"]),
+        ("voxel", body, &["image.shading=voxel", "image.dimensions=[400, 100, 100]", "ao.samples=1000"]),
     ] {
         let folder = Folder::with(&PIPELINE.replace(body, shape));
         let arguments: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
