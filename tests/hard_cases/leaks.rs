@@ -58,7 +58,7 @@ fn leaks<const D: usize>(body: &Body<D>, rays: usize) -> [usize; 2] {
         for level in Level::available() {
             // The other levels on a part of them.
             let part = if level == Level::best() { &directions[..] } else { &directions[..per_point / 8] };
-            let hit = Stream::new(level).count_occluded(&tracer, origin, part, f32::INFINITY, None);
+            let hit = Stream::new(level).count_occluded(&tracer, origin, Vector::zeros(), part, f32::INFINITY, None);
             found[0] += part.len() - hit as usize;
         }
         found[1] += (directions.iter().enumerate())

@@ -85,8 +85,14 @@ fn doubled_surfaces<const D: usize>() {
             let expected = first(&mesh, &ray);
             wrong[0] += usize::from(tracer.closest_hit(&ray).map(|hit| hit.simplex) != expected);
             let unit = ray.direction / (2.0 * ray.direction.amax());
-            let occluded =
-                Stream::new(Level::best()).count_occluded(&tracer, &ray.origin, &[unit], f32::INFINITY, None);
+            let occluded = Stream::new(Level::best()).count_occluded(
+                &tracer,
+                &ray.origin,
+                Vector::zeros(),
+                &[unit],
+                f32::INFINITY,
+                None,
+            );
             let scaled = Ray::new(ray.origin, unit);
             wrong[1] += usize::from((occluded == 1) != first(&mesh, &scaled).is_some());
         }
