@@ -95,7 +95,7 @@ fn what_is_not_yaml() {
 #[test]
 fn keys_and_types() {
     let occlusion_keys =
-        "(known: id, input, method, samples, target_error, max_samples, max_distance, file, load, seed)";
+        "(known: id, input, method, samples, target_error, max_samples, max_cones, max_distance, file, load, seed)";
     for (from, to, message) in [
         ("samples:", "^sampels:", format!("stages[1].occlusion.sampels: unknown key, did you mean `samples`? {occlusion_keys}")),
         ("seed: 1", "^sed: 1", "sed: unknown key, did you mean `seed`? (known: name, seed, stages)".into()),
@@ -130,11 +130,6 @@ fn ranges() {
         ("[4, 4, 4]", "[4, 4, ^65536]", "stages[2].render.dimensions[2]: expected 1 to 65535, found 65536"),
         ("samples: 16", "samples: ^0", "stages[1].occlusion.samples: expected 1 to 16777216 samples, found 0"),
         ("samples: 16", "max_distance: ^0", "stages[1].occlusion.max_distance: expected a number above 0, found 0"),
-        (
-            "samples: 16",
-            "method: ^as_published",
-            "stages[1].occlusion.method: `as_published` is not available in this version",
-        ),
         (
             "samples: 16",
             "target_error: ^0.01",
@@ -264,7 +259,7 @@ fn overrides_are_checked_as_strictly() {
     for (set, message) in [
         (
             "occlusion.sampels=64",
-            "--set occlusion.sampels=64: stages[1].occlusion.sampels: unknown key, did you mean `samples`? (known: id, input, method, samples, target_error, max_samples, max_distance, file, load, seed)",
+            "--set occlusion.sampels=64: stages[1].occlusion.sampels: unknown key, did you mean `samples`? (known: id, input, method, samples, target_error, max_samples, max_cones, max_distance, file, load, seed)",
         ),
         ("ao.samples=0", "--set ao.samples=0: stages[1].occlusion.samples: expected 1 to 16777216 samples, found 0"),
         (
