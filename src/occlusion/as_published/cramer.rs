@@ -127,6 +127,6 @@ mod tests {
         assert_eq!(plain_cramer(&corners, &Ray::new(ray.origin, -ray.direction)), [false, false]);
         let printed = Slips { printed_equations: true, ..Slips::PUBLISHED };
         let (t, _) = cramer(&corners, &ray.origin, &ray.direction, printed);
-        assert!(!((t - 4.0 / 3.0).abs() < 0.1), "as printed it does not find it: {t}");
+        assert!(t.is_nan() || (t - 4.0 / 3.0).abs() > 0.1, "as printed it does not find it: {t}");
     }
 }

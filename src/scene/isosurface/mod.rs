@@ -1,6 +1,6 @@
 //! Isosurfaces: where a field, given by a formula or as a grid of values, passes a value.
 //!
-//! [`table`] says what the surface is within one cell of a grid, [`march`] goes over all cells, [`field`] and [`expression`]
+//! [`table`] says what the surface is within one cell of a grid, [`march`] goes over all cells, [`field`] and `expression`
 //! make fields of formulas. For D = 4 that is marching hypercubes, for D = 3 marching cubes. The surface
 //! is piecewise linear and converges with the square of the cells' size. Around the grid is nothing, if `pad` is not
 //! switched off, so that a body that reaches beyond the grid is cut off flat there, a fiftieth of a cell outside of it, and

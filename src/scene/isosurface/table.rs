@@ -58,6 +58,12 @@ pub struct Table<const D: usize> {
     cases: Vec<OnceLock<Case<D>>>,
 }
 
+impl<const D: usize> Default for Table<D> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<const D: usize> Table<D> {
     const CORNERS: usize = 1 << D;
 
