@@ -139,6 +139,44 @@ fn an_open_fold_of_90_degrees_shows_the_sine_of_45() {
     right_angled_fold::<4>();
 }
 
+fn fold_of_a_body<const D: usize>() {
+    // A box with a notch, and the two walls of that notch alone: what the walls' own simplices hide at the fold is what
+    // the whole body hides there, ray for ray.
+    let corner = |x: f64| vec![x; D];
+    let mut from = corner(-1.0);
+    (from[0], from[1]) = (1.0, 1.0);
+    let spec = serde_json::json!({ "cut_cube": {
+        "min": corner(0.0), "max": corner(2.0), "cuts": [{ "from": from, "to": corner(3.0) }], "subdivisions": 4
+    }});
+    let spec: ao4d::scene::ObjectSpec = serde_json::from_value(spec).unwrap();
+    let closed: Surface<D> = ao4d::scene::build_object(&spec, ".".as_ref()).unwrap();
+    let mut open = closed.clone();
+    open.simplices.retain(|s| {
+        let points = s.map(|v| closed.vertices[v as usize]);
+        (0..2).any(|axis| points.iter().all(|p| p[axis] == 1.0 && p[1 - axis] >= 1.0))
+    });
+    assert!(!open.simplices.is_empty() && open.simplices.len() < closed.simplices.len() / 2);
+    let (closed, open) = (mesh(&[closed]), mesh(&[open]));
+    assert!(closed.objects[0].is_closed() && !open.objects[0].is_closed());
+    let values = [&closed, &open].map(|m| at_vertices(&Tracer::new(m), &settings(4096), &Silent).unwrap());
+    let mut folds = 0;
+    for (v, p) in closed.vertices.iter().enumerate() {
+        // On the fold, and not at its ends, where the body has another face.
+        if p[0] == 1.0 && p[1] == 1.0 && (2..D).all(|axis| p[axis] > 0.0 && p[axis] < 2.0) {
+            folds += 1;
+            assert_eq!(values[0][v], values[1][v], "{D}D, at {p}");
+            assert!(values[0][v] > 0.70 && values[0][v] < 0.9, "{}", values[0][v]);
+        }
+    }
+    assert_eq!(folds, 3usize.pow(D as u32 - 2));
+}
+
+#[test]
+fn a_fold_has_the_same_value_open_and_as_part_of_a_body() {
+    fold_of_a_body::<3>();
+    fold_of_a_body::<4>();
+}
+
 fn ball_above<const D: usize>() {
     // A tessellated ball of radius r at distance d straight above a point takes (r/d)^(D-1), bracketed by the balls
     // inside and around the tessellation.

@@ -2,44 +2,17 @@
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64};
-use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::mesh::{Mesh, Surface};
 use ao4d::progress::Silent;
 use ao4d::render::{Camera, Channel, Picture, Projection, Shading, View};
 use ao4d::volume::Values;
 
-/// A small generator, so that a failure can be repeated.
-struct Random(u32);
+mod support;
 
-impl Random {
-    /// In [-1, 1), on a coarse grid with many coincidences if `coarse`.
-    fn next(&mut self, coarse: bool) -> f64 {
-        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        if coarse {
-            f64::from((self.0 >> 24) % 5) * 0.5 - 1.0
-        } else {
-            f64::from(self.0 >> 8) / f64::from(1 << 23) - 1.0
-        }
-    }
-
-    fn point<const D: usize>(&mut self, coarse: bool) -> Vector64<D> {
-        Vector64::from_fn(|_, _| self.next(coarse))
-    }
-}
-
-fn mesh<const D: usize>(surface: &Surface<D>) -> Mesh<D> {
-    let mut builder = MeshBuilder::new();
-    builder.add("one", [1.0; 3], surface, Orientation::Input).unwrap();
-    builder.finish()
-}
+use support::{Random, mesh};
 
 fn soup<const D: usize>(random: &mut Random, count: usize, coarse: bool) -> Mesh<D> {
-    let mut vertices = Vec::new();
-    for _ in 0..count {
-        let centre: Vector64<D> = random.point(coarse);
-        vertices.extend((0..D).map(|_| centre + random.point(coarse) * 0.5));
-    }
-    let simplices = (0..count).map(|s| std::array::from_fn(|i| (s * D + i) as u32)).collect();
-    mesh(&Surface { vertices, simplices, normals: None })
+    mesh(&random.soup(count, 0.5, coarse))
 }
 
 /// The first hit by testing every simplex and comparing the distances exactly.

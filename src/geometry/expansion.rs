@@ -8,8 +8,9 @@
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Expansion(Vec<f64>);
 
+/// The rounded sum, and what rounding lost (Knuth).
 #[inline]
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     let a_part = sum - b_part;
@@ -23,8 +24,9 @@ fn split(a: f64) -> (f64, f64) {
     (high, a - high)
 }
 
+/// The rounded product, and what rounding lost (Dekker, Veltkamp).
 #[inline]
-fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     let (a_high, a_low) = split(a);
     let (b_high, b_low) = split(b);

@@ -22,6 +22,7 @@ pub use aabb::Aabb;
 pub use cone::{Cone, Crossing};
 pub use determinant::{cross, determinant};
 pub use expansion::Expansion;
+pub(crate) use expansion::{two_product, two_sum};
 pub use frame::Frame;
 pub use ray::Ray;
 pub use sign::{Column, determinant_sign, exact_determinant};

@@ -125,8 +125,17 @@ mod tests {
         assert!(weights.iter().zip(expected).all(|(w, e): (&f32, f32)| (w - e).abs() < 1e-6), "{weights:?}");
         assert_eq!(plain_cramer(&corners, &ray), [true, true]);
         assert_eq!(plain_cramer(&corners, &Ray::new(ray.origin, -ray.direction)), [false, false]);
+    }
+
+    #[test]
+    fn as_printed_t_counts_backwards() {
+        // In 3D that is the whole slip of Eq. 2.7; the point is the same.
+        let corners: [Vector<3>; 3] = std::array::from_fn(|i| Vector::from_fn(|r, _| if r == i { 2.0 } else { 0.0 }));
+        let ray = Ray::new(Vector::zeros(), Vector::from([0.25, 0.25, 0.5]));
         let printed = Slips { printed_equations: true, ..Slips::PUBLISHED };
-        let (t, _) = cramer(&corners, &ray.origin, &ray.direction, printed);
-        assert!(t.is_nan() || (t - 4.0 / 3.0).abs() > 0.1, "as printed it does not find it: {t}");
+        let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, Slips::PUBLISHED);
+        let (backwards, same) = cramer(&corners, &ray.origin, &ray.direction, printed);
+        assert_eq!((t, backwards), (2.0, -2.0));
+        assert_eq!((weights, same[1..].to_vec()), ([0.25, 0.25, 0.5], vec![0.25, 0.5]));
     }
 }

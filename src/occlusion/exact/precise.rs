@@ -6,7 +6,7 @@
 //! power of two, it is computed in 128-bit integers. Only what is left goes to expansions, which are some hundred
 //! times slower.
 
-use crate::geometry::{Column, Expansion, Vector64};
+use crate::geometry::{Column, Expansion, Vector64, two_product, two_sum};
 
 /// Rounding of a sum of products of D pairs' numbers, relative to the product of the columns' 1-norms. Each operation
 /// rounds by less than 2^-103 of its result; a D x D determinant has fewer than 2^6 of them on any path of additions.
@@ -19,32 +19,23 @@ pub(super) struct Pair {
     pub low: f64,
 }
 
-#[inline]
-fn two_sum(a: f64, b: f64) -> Pair {
-    let high = a + b;
-    let b_part = high - a;
-    Pair { high, low: (a - (high - b_part)) + (b - b_part) }
+impl From<(f64, f64)> for Pair {
+    #[inline]
+    fn from((high, low): (f64, f64)) -> Self {
+        Self { high, low }
+    }
 }
 
 #[inline]
-fn split(a: f64) -> (f64, f64) {
-    let c = 134_217_729.0 * a; // 2^27 + 1
-    let high = c - (c - a);
-    (high, a - high)
-}
-
-#[inline]
-fn two_product(a: f64, b: f64) -> Pair {
-    let high = a * b;
-    let ((a_high, a_low), (b_high, b_low)) = (split(a), split(b));
-    Pair { high, low: ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low }
+fn rounded_sum(a: f64, b: f64) -> Pair {
+    two_sum(a, b).into()
 }
 
 impl Pair {
     /// `a - b`, exactly.
     #[inline]
     pub fn difference(a: f32, b: f32) -> Self {
-        two_sum(f64::from(a), -f64::from(b))
+        rounded_sum(f64::from(a), -f64::from(b))
     }
 
     /// A sum of two doubles of which the second is the smaller.
@@ -60,9 +51,9 @@ impl Pair {
 
     #[inline]
     pub fn plus(self, other: Self) -> Self {
-        let (high, low) = (two_sum(self.high, other.high), two_sum(self.low, other.low));
-        let sum = two_sum(high.high, high.low + low.high);
-        two_sum(sum.high, sum.low + low.low)
+        let (high, low) = (rounded_sum(self.high, other.high), rounded_sum(self.low, other.low));
+        let sum = rounded_sum(high.high, high.low + low.high);
+        rounded_sum(sum.high, sum.low + low.low)
     }
 
     #[inline]
@@ -72,8 +63,8 @@ impl Pair {
 
     #[inline]
     pub fn times(self, other: Self) -> Self {
-        let product = two_product(self.high, other.high);
-        two_sum(product.high, product.low + (self.high * other.low + self.low * other.high))
+        let product: Pair = two_product(self.high, other.high).into();
+        rounded_sum(product.high, product.low + (self.high * other.low + self.low * other.high))
     }
 }
 
