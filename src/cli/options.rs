@@ -12,7 +12,7 @@ use super::console::Console;
 /// How much is said on stderr.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct Messages {
-    /// Say nothing but errors
+    /// Say results and errors only
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
     /// Say more
