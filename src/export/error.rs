@@ -48,8 +48,8 @@ pub enum Error {
         name: String,
     },
     /// The PNG encoder refuses.
-    #[error("writing the picture failed")]
-    Png(#[from] ::png::EncodingError),
+    #[error("writing the picture failed: {0}")]
+    Png(::png::EncodingError),
     /// The mesh writer refuses.
     #[error("writing the mesh failed: {0}")]
     Mesh(String),
@@ -59,6 +59,15 @@ impl From<io::Error> for Error {
     // Not thiserror's `from`: the message has the reason already, and who prints causes as well would say it twice.
     fn from(cause: io::Error) -> Self {
         Error::Write(cause)
+    }
+}
+
+impl From<::png::EncodingError> for Error {
+    fn from(error: ::png::EncodingError) -> Self {
+        match error {
+            ::png::EncodingError::IoError(cause) => Error::Write(cause),
+            error => Error::Png(error),
+        }
     }
 }
 

@@ -13,8 +13,12 @@ pub struct Sidecar {
     pub count: usize,
     /// The method's name in the pipeline.
     pub method: String,
-    /// Rays a vertex; none for methods without.
+    /// Rays a vertex, at most so many if there is a target; none for methods without.
     pub samples: Option<u32>,
+    /// The standard error that was aimed at, if one was.
+    pub target_error: Option<f64>,
+    /// Rays that were asked for a vertex, on average, where that is known.
+    pub mean_samples: Option<f64>,
     /// The pipeline's seed.
     pub seed: u64,
     /// Distance beyond which hits don't count; infinite if all do.
@@ -75,6 +79,12 @@ impl Sidecar {
         if let Some(samples) = self.samples {
             line("samples", &samples);
         }
+        if let Some(error) = self.target_error {
+            line("target_error", &error);
+        }
+        if let Some(mean) = self.mean_samples {
+            line("mean_samples", &format!("{mean:.1}"));
+        }
         line("seed", &self.seed);
         if self.max_distance.is_finite() {
             line("max_distance", &self.max_distance);
@@ -101,6 +111,8 @@ impl Sidecar {
             count: number("count", field("count")?)?,
             method: field("method")?.to_owned(),
             samples: field("samples").ok().map(|v| number("samples", v)).transpose()?,
+            target_error: field("target_error").ok().map(|v| number("target_error", v)).transpose()?,
+            mean_samples: field("mean_samples").ok().map(|v| number("mean_samples", v)).transpose()?,
             seed: number("seed", field("seed")?)?,
             max_distance: field("max_distance").map_or(Ok(f32::INFINITY), |v| number("max_distance", v))?,
             error_estimate: number("error_estimate", field("error_estimate")?)?,
@@ -131,7 +143,9 @@ mod tests {
         let sidecar = Sidecar {
             count: 8,
             method: "sobol".into(),
-            samples: Some(256),
+            samples: Some(65_536),
+            target_error: Some(0.005),
+            mean_samples: Some(812.5),
             seed: u64::MAX,
             max_distance: 0.1,
             error_estimate: 0.0125,
@@ -140,7 +154,13 @@ mod tests {
         };
         let text = sidecar.to_yaml();
         assert_eq!(Sidecar::from_yaml(&text), Ok(sidecar.clone()));
-        let plain = Sidecar { samples: None, max_distance: f32::INFINITY, ..sidecar.clone() };
+        let plain = Sidecar {
+            samples: None,
+            target_error: None,
+            mean_samples: None,
+            max_distance: f32::INFINITY,
+            ..sidecar.clone()
+        };
         assert_eq!(Sidecar::from_yaml(&plain.to_yaml()), Ok(plain));
         for key in ["count", "method", "seed", "error_estimate", "mesh", "program"] {
             let without: String = text.lines().filter(|l| !l.starts_with(key)).map(|l| format!("{l}\n")).collect();

@@ -14,19 +14,23 @@
 //! - a visible point inside a simplex ignores that simplex.
 
 mod as_published;
+mod estimate;
 pub mod exact;
 mod file;
+mod method;
 mod sampling;
 mod site;
 mod stream;
 mod vertices;
 
 pub use as_published::{AsPublished, Slips, as_published, plain_cramer};
+pub use estimate::{Estimate, Target};
 pub use file::{FileError, Sidecar, decode, encode};
-pub use sampling::{Sampler, Sequence, cube_to_ball, square_to_disk};
+pub use method::{Method, adaptive};
+pub use sampling::{Sampler, Sequence, cube_to_ball, direction, square_to_disk};
 pub use site::Site;
 pub use stream::{Level, Stream};
-pub use vertices::{ambient_occlusion, at_vertices, at_vertices_with, error_estimate};
+pub use vertices::{Estimates, ambient_occlusion, at_vertices, at_vertices_with, estimate_at, estimate_vertices};
 
 /// How ambient occlusion is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]

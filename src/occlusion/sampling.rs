@@ -60,6 +60,14 @@ impl Sequence {
         Self { source, next: 0 }
     }
 
+    /// How its points are chosen.
+    pub(super) fn sampler(&self) -> Sampler {
+        match self.source {
+            Source::Sobol(_) => Sampler::Sobol,
+            Source::Random(_) => Sampler::Random,
+        }
+    }
+
     /// The next point, each coordinate in (-1, 1) on a grid of 2^24.
     #[inline]
     pub fn next_point<const N: usize>(&mut self) -> [f32; N] {

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{Cancelled, Level, Sequence, Settings, Site, Stream};
+use super::estimate::Tally;
+use super::{Cancelled, Estimate, Level, Sequence, Settings, Site, Stream, Target};
 use crate::accel::Tracer;
 use crate::mesh::{Incidence, Mesh};
 use crate::progress::Progress;
@@ -10,18 +11,51 @@ use crate::progress::Progress;
 /// Rays between two looks at whether to go on, about.
 const BATCH_RAYS: usize = 1 << 13;
 
-/// Estimates A at one point: the share of `settings.samples` cosine-weighted rays that escape. `number` tells points
-/// apart: each has its own rays. This is the slow way, ray by ray, which defines the value.
-pub fn ambient_occlusion<const D: usize>(tracer: &Tracer<D>, site: &Site<D>, settings: &Settings, number: u64) -> f32 {
+/// Values at the vertices of a mesh, in vertex order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimates {
+    /// Ambient occlusion.
+    pub values: Vec<f32>,
+    /// The standard error of each, 0 where it is known.
+    pub errors: Vec<f32>,
+    /// Rays asked in all.
+    pub rays: u64,
+}
+
+impl Estimates {
+    /// The root mean square of the errors.
+    pub fn error(&self) -> f64 {
+        let squares: f64 = self.errors.iter().map(|&e| f64::from(e).powi(2)).sum();
+        (squares / self.errors.len().max(1) as f64).sqrt()
+    }
+}
+
+/// Estimates A at one point: the share of cosine-weighted rays that escape, of `settings.samples`, or of as many as meet
+/// the target. `number` tells points apart: each has its own rays. This is the slow way, ray by ray, which defines the
+/// value.
+pub fn estimate_at<const D: usize>(
+    tracer: &Tracer<D>,
+    site: &Site<D>,
+    settings: &Settings,
+    target: Option<Target>,
+    number: u64,
+) -> Estimate {
     if site.normal.amax() == 0.0 {
-        return 1.0;
+        return Estimate::known(1.0);
     }
     let frame = site.frame();
     let mut sequence = Sequence::new(settings.sampler, settings.seed, number);
-    let visible = (0..settings.samples)
-        .filter(|_| site.is_visible(tracer, sequence.next_direction(&frame), settings.max_distance))
-        .count();
-    (visible as f64 / f64::from(settings.samples)) as f32
+    let mut tally = Tally::new(settings.sampler);
+    while tally.rays() < settings.samples && !target.is_some_and(|target| target.is_met(&tally)) {
+        let visible = site.is_visible(tracer, sequence.next_direction(&frame), settings.max_distance);
+        tally.add(u64::from(visible), 1);
+    }
+    tally.estimate()
+}
+
+/// The value alone, of all rays.
+pub fn ambient_occlusion<const D: usize>(tracer: &Tracer<D>, site: &Site<D>, settings: &Settings, number: u64) -> f32 {
+    estimate_at(tracer, site, settings, None, number).value
 }
 
 /// Estimates A at every vertex of the mesh, in vertex order. A vertex that belongs to no simplex has the value 1. The
@@ -50,35 +84,57 @@ pub fn at_vertices_with<const D: usize>(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Vec<f32>, Cancelled> {
-    let mesh = tracer.mesh();
-    let incidence = Incidence::new(mesh);
-    let order = spatial_order(tracer);
-    let batch = (BATCH_RAYS / settings.samples.max(1) as usize).clamp(1, 64);
-    let batches = order.par_chunks(batch).with_min_len(8).map_init(
-        || Stream::new(level),
-        |stream, vertices| {
-            if progress.cancelled() {
-                return Err(Cancelled);
-            }
-            let values: Vec<f32> =
-                vertices.iter().map(|&vertex| stream.at_vertex(tracer, &incidence, settings, vertex)).collect();
-            progress.advance(values.len() as u64);
-            Ok(values)
-        },
-    );
-    let found: Vec<Vec<f32>> = batches.collect::<Result<_, _>>()?;
-    let mut values = vec![1.0; mesh.vertices.len()];
-    for (&vertex, value) in order.iter().zip(found.into_iter().flatten()) {
-        values[vertex as usize] = value;
-    }
-    Ok(values)
+    Ok(estimate_vertices(level, tracer, settings, None, progress)?.values)
 }
 
-/// The root mean square over all values of the standard error that so many independent samples have. Scrambled Sobol'
-/// points do better, so for them this is an upper estimate.
-pub fn error_estimate(values: &[f32], samples: u64) -> f64 {
-    let variance = |&v: &f32| f64::from(v) * (1.0 - f64::from(v)) / samples as f64;
-    (values.iter().map(variance).sum::<f64>() / values.len().max(1) as f64).sqrt()
+/// [`at_vertices_with`] with errors, and until a target is met if there is one; at most `settings.samples` rays a vertex.
+///
+/// # Errors
+/// [`Cancelled`] if `progress` says so.
+///
+/// # Panics
+/// If this processor lacks the instructions.
+pub fn estimate_vertices<const D: usize>(
+    level: Level,
+    tracer: &Tracer<D>,
+    settings: &Settings,
+    target: Option<Target>,
+    progress: &dyn Progress,
+) -> Result<Estimates, Cancelled> {
+    let incidence = Incidence::new(tracer.mesh());
+    let usual = target.map_or(settings.samples, |_| Target::FEWEST.min(settings.samples));
+    let batch = (BATCH_RAYS / usual.max(1) as usize).clamp(1, 64);
+    let estimate =
+        |stream: &mut Stream<D>, vertex| stream.estimate_at_vertex(tracer, &incidence, settings, target, vertex);
+    everywhere(tracer, batch, progress, || Stream::new(level), estimate)
+}
+
+/// Asks for every vertex, on all cores, a batch at a time.
+pub(super) fn everywhere<const D: usize, S>(
+    tracer: &Tracer<D>,
+    batch: usize,
+    progress: &dyn Progress,
+    memory: impl Fn() -> S + Sync + Send,
+    estimate: impl Fn(&mut S, u32) -> Estimate + Sync + Send,
+) -> Result<Estimates, Cancelled> {
+    let order = spatial_order(tracer);
+    let batches = order.par_chunks(batch).with_min_len(8).map_init(memory, |memory, vertices| {
+        if progress.cancelled() {
+            return Err(Cancelled);
+        }
+        let found: Vec<Estimate> = vertices.iter().map(|&vertex| estimate(memory, vertex)).collect();
+        progress.advance(found.len() as u64);
+        Ok(found)
+    });
+    let found: Vec<Vec<Estimate>> = batches.collect::<Result<_, _>>()?;
+    let count = order.len();
+    let mut estimates = Estimates { values: vec![1.0; count], errors: vec![0.0; count], rays: 0 };
+    for (&vertex, estimate) in order.iter().zip(found.into_iter().flatten()) {
+        estimates.values[vertex as usize] = estimate.value;
+        estimates.errors[vertex as usize] = estimate.error;
+        estimates.rays += u64::from(estimate.rays);
+    }
+    Ok(estimates)
 }
 
 /// All vertices, those that are close in the hierarchy close to each other: then the nodes that one of them needs are

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::plan::{OcclusionSource, Plan, ScenePlan, WritePlan};
-use super::prepare::sidecar_path;
+use super::prepare::{errors_path, sidecar_path};
 use crate::export::{self, AtomicFile};
 use crate::scene::Orientation;
 
@@ -98,7 +98,8 @@ impl Keys {
         let occlusions: Vec<String> = (plan.occlusions.iter())
             .map(|occlusion| match &occlusion.source {
                 OcclusionSource::Load(file) => {
-                    key(&(&scenes[occlusion.scene], content(file), content(&sidecar_path(file))))
+                    let beside = [sidecar_path(file), errors_path(file)].map(|path| content(&path));
+                    key(&(&scenes[occlusion.scene], content(file), beside))
                 }
                 OcclusionSource::Compute(computation) => key(&(&scenes[occlusion.scene], computation)),
             })

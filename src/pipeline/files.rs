@@ -13,7 +13,7 @@ use crate::export::vti::{self, ArraySpec, VtiWriter};
 use crate::export::{self, AtomicFile, Error, png, raw::RawWriter, vtu};
 use crate::geometry::widen;
 use crate::mesh::Mesh;
-use crate::occlusion::{self, Sidecar};
+use crate::occlusion::{self, Estimates, Sidecar};
 use crate::render::{Camera, Channel, Picture};
 use crate::volume::{Array, Grid, Kind, Values};
 
@@ -167,17 +167,23 @@ fn vti_settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option
 }
 
 /// What is known about values that were computed.
-pub(super) fn sidecar(values: &[f32], computation: &Computation, mesh_hash: &str) -> Sidecar {
+pub(super) fn sidecar(found: &Estimates, computation: &Computation, mesh_hash: &str) -> Sidecar {
     let Computation { method, samples, max_distance, seed, .. } = computation;
-    let fixed = if let Samples::Fixed(n) = samples { Some(*n) } else { None };
+    let (most, target_error) = match *samples {
+        Samples::Fixed(n) => (Some(n), None),
+        Samples::Target { error, max_samples } => (Some(max_samples), Some(error)),
+        Samples::Exact => (None, None),
+    };
+    let count = found.values.len();
     Sidecar {
-        count: values.len(),
+        count,
         method: method.as_str().to_owned(),
-        samples: fixed.and_then(|n| u32::try_from(n).ok()),
+        samples: most.and_then(|n| u32::try_from(n).ok()),
+        target_error,
+        mean_samples: most.map(|_| found.rays as f64 / count.max(1) as f64),
         seed: *seed,
         max_distance: max_distance.map_or(f32::INFINITY, |d| d as f32),
-        // Without a sign: of no values at all it is a negative zero.
-        error_estimate: fixed.map_or(0.0, |n| occlusion::error_estimate(values, n).abs()),
+        error_estimate: found.error(),
         mesh: mesh_hash.to_owned(),
         program: PROGRAM.to_owned(),
     }
@@ -203,7 +209,7 @@ pub(super) fn write_mesh<const D: usize>(
     path: &Path,
     mesh: &Mesh<D>,
     camera: &Camera<D>,
-    values: Option<&[f32]>,
+    found: Option<&Estimates>,
 ) -> Result<(u64, usize), Error> {
     let mut before = vec![true; mesh.vertices.len()];
     let mut points = vec![[0.0f32; 3]; mesh.vertices.len()];
@@ -231,8 +237,12 @@ pub(super) fn write_mesh<const D: usize>(
         Array::new("normal", D, coordinates(&mesh.normals)),
         Array::new("object", 1, object),
     ];
-    if let Some(values) = values {
-        arrays.push(Array::new("ambient_occlusion", 1, values.to_vec()));
+    if let Some(found) = found {
+        arrays.push(Array::new("ambient_occlusion", 1, found.values.clone()));
+        // Of loaded values nothing is known.
+        if found.errors.len() == found.values.len() {
+            arrays.push(Array::new("occlusion_error", 1, found.errors.clone()));
+        }
     }
     let mut file = AtomicFile::create(path)?;
     if D == 3 {

@@ -1,54 +1,45 @@
-//! From an occlusion's plan to its values: which engine computes them, with which settings.
+//! From an occlusion's plan to its values: which method computes them, and which files keep them.
 
-use super::plan::{Computation, Samples};
-use super::spec::Method;
-use crate::accel::Tracer;
-use crate::occlusion::exact::{self, Budget};
-use crate::occlusion::{self, Sampler, Slips};
-use crate::progress::Progress;
-use crate::render::Shading;
+use std::path::{Path, PathBuf};
 
-/// The values at all vertices.
-///
-/// # Errors
-/// [`occlusion::Error`]: cancelled, or too dear for the closed form.
-pub(super) fn values<const D: usize>(
-    tracer: &Tracer<D>,
-    computation: &Computation,
-    progress: &dyn Progress,
-) -> Result<Vec<f32>, occlusion::Error> {
-    match computation.method {
-        Method::Exact => {
-            let values = exact::at_vertices(tracer, budget(computation), progress)?;
-            Ok(values.into_iter().map(|value| value as f32).collect())
-        }
-        Method::AsPublished => Ok(occlusion::as_published(tracer, Slips::PUBLISHED, &sampling(computation), progress)?),
-        _ => Ok(occlusion::at_vertices(tracer, &sampling(computation), progress)?),
-    }
-}
+use super::plan::{Computation, OcclusionPlan, OcclusionSource, Samples};
+use super::prepare::{Loaded, errors_path, read_values};
+use super::spec;
+use crate::occlusion::exact::Budget;
+use crate::occlusion::{Estimates, Method, Sampler, Settings, Slips, Target};
 
-/// The shading that computes each visible point's value itself.
-pub(super) fn voxel_shading(computation: &Computation) -> Shading<'static> {
-    match computation.method {
-        Method::Exact => Shading::Exact(budget(computation)),
-        _ => Shading::Voxel(sampling(computation)),
-    }
-}
-
-fn budget(computation: &Computation) -> Budget {
-    Budget { cones: usize::try_from(computation.max_cones).unwrap_or(usize::MAX) }
-}
-
-/// The settings that a computation stands for.
-fn sampling(computation: &Computation) -> occlusion::Settings {
-    let samples = match computation.samples {
-        Samples::Fixed(n) | Samples::Target { max_samples: n, .. } => n,
-        Samples::Exact => 1,
+/// The method that a computation stands for.
+pub(super) fn method(computation: &Computation) -> Method {
+    let (samples, target) = match computation.samples {
+        Samples::Fixed(n) => (n, None),
+        Samples::Target { error, max_samples } => (max_samples, Some(Target { error: error as f32 })),
+        Samples::Exact => return Method::Exact(Budget { cones: computation.max_cones as usize }),
     };
-    occlusion::Settings {
-        sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
+    let settings = Settings {
+        sampler: if computation.method == spec::Method::Random { Sampler::Random } else { Sampler::Sobol },
         samples: u32::try_from(samples).unwrap_or(u32::MAX),
         seed: computation.seed,
         max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
+    };
+    match computation.method {
+        spec::Method::Adaptive => Method::Adaptive(settings, target),
+        spec::Method::AsPublished => Method::AsPublished(settings, Slips::PUBLISHED),
+        _ => Method::Sampled(settings, target),
     }
+}
+
+/// Where the standard errors of an occlusion's values are kept: in `NAME.error.f32` beside `NAME.f32`. None if there is no
+/// file, or no error.
+pub(super) fn errors_file(occlusion: &OcclusionPlan) -> Option<PathBuf> {
+    let known = match &occlusion.source {
+        OcclusionSource::Compute(computation) => computation.samples != Samples::Exact,
+        OcclusionSource::Load(file) => errors_path(file).is_file(),
+    };
+    occlusion.file.as_ref().filter(|_| known).map(|file| errors_path(file))
+}
+
+/// Reads what an earlier run has left of an occlusion; nothing if it can't be used.
+pub(super) fn kept(out: &Path, occlusion: &OcclusionPlan, hash: &str, vertices: usize) -> Option<Estimates> {
+    let Loaded { values, errors, .. } = read_values(&out.join(occlusion.file.as_deref()?), hash, vertices).ok()?;
+    (errors.len() == values.len()).then_some(Estimates { values, errors, rays: 0 })
 }

@@ -22,6 +22,8 @@ pub struct Prepared {
 pub struct Loaded {
     /// One value a vertex.
     pub values: Vec<f32>,
+    /// Their standard errors; empty if nothing is known of them.
+    pub errors: Vec<f32>,
     /// What stands beside them.
     pub sidecar: Sidecar,
 }
@@ -69,6 +71,11 @@ pub(super) fn sidecar_path(file: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// The path of the values' standard errors: `NAME.error.f32` beside `NAME.f32`.
+pub(super) fn errors_path(file: &Path) -> PathBuf {
+    file.with_extension("error.f32")
+}
+
 /// Reads an occlusion file for a mesh.
 fn load(file: &Path, mesh: &AnyMesh) -> Result<Loaded, String> {
     let (hash, vertices) = match mesh {
@@ -84,9 +91,16 @@ pub(super) fn read_values(file: &Path, hash: &str, vertices: usize) -> Result<Lo
     let unreadable = |path: &Path, cause: std::io::Error| format!("can't read {}: {cause}", path.display());
     let text = std::fs::read_to_string(&side).map_err(|e| unreadable(&side, e))?;
     let bytes = std::fs::read(file).map_err(|e| unreadable(file, e))?;
-    let loaded = Sidecar::from_yaml(&text).and_then(|sidecar| {
-        sidecar.check(hash, vertices)?;
-        Ok(Loaded { values: occlusion::decode(&bytes, vertices)?, sidecar })
-    });
-    loaded.map_err(|e| format!("can't use {}: {e}", file.display()))
+    let unusable = |path: &Path, cause: String| format!("can't use {}: {cause}", path.display());
+    let sidecar = Sidecar::from_yaml(&text).and_then(|s| s.check(hash, vertices).map(|()| s));
+    let sidecar = sidecar.map_err(|e| unusable(file, e.to_string()))?;
+    let values = occlusion::decode(&bytes, vertices).map_err(|e| unusable(file, e.to_string()))?;
+    let beside = errors_path(file);
+    let errors = match std::fs::read(&beside) {
+        Ok(bytes) => occlusion::decode(&bytes, vertices).map_err(|e| unusable(&beside, e.to_string()))?,
+        // The closed form leaves none.
+        Err(_) if sidecar.error_estimate == 0.0 => vec![0.0; vertices],
+        Err(_) => Vec::new(),
+    };
+    Ok(Loaded { values, errors, sidecar })
 }

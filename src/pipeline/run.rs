@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 use super::build::{AnyMesh, camera};
 use super::cache::{Cache, Keys};
 use super::files::{self, PictureFiles};
-use super::occlude::{self, voxel_shading};
-use super::plan::{Computation, OcclusionSource, Plan, RenderPlan, Samples, StageRef, grouped};
-use super::prepare::{Loaded, Prepared, read_values, sidecar_path};
+use super::occlude::{errors_file, kept, method};
+use super::plan::{OcclusionSource, Plan, RenderPlan, StageRef, grouped};
+use super::prepare::{Loaded, Prepared, sidecar_path};
 use super::report::{FileReport, Report};
 use super::spec;
 use super::work::Stale;
@@ -22,7 +22,7 @@ use super::{Error, Pipeline, Settings, figure, limits};
 use crate::accel::Tracer;
 use crate::export;
 use crate::mesh::Mesh;
-use crate::occlusion::{self, Cancelled};
+use crate::occlusion::{self, Cancelled, Estimates};
 use crate::progress::Progress;
 use crate::render::{CameraError, Picture, Shading};
 
@@ -136,7 +136,7 @@ struct Scene<'m, const D: usize> {
     mesh: &'m Mesh<D>,
     hash: String,
     tracer: OnceCell<Tracer<'m, D>>,
-    values: BTreeMap<usize, Vec<f32>>,
+    values: BTreeMap<usize, Estimates>,
 }
 
 impl<'m, const D: usize> Scene<'m, D> {
@@ -222,32 +222,24 @@ impl Run<'_> {
         }
         let start = Instant::now();
         self.values(index, scene)?;
-        let detail = self.rate(index, scene.mesh.vertices.len(), start.elapsed());
-        let values = &scene.values[&index];
-        let path = self.plan.out.join(file);
-        let sidecar = match (&self.plan.occlusions[index].source, &self.loaded[index]) {
-            (OcclusionSource::Compute(computation), _) => files::sidecar(values, computation, &scene.hash),
+        let found = &scene.values[&index];
+        let detail = rate(found, start.elapsed());
+        let plan = self.plan;
+        let occlusion = &plan.occlusions[index];
+        let sidecar = match (&occlusion.source, &self.loaded[index]) {
+            (OcclusionSource::Compute(computation), _) => files::sidecar(found, computation, &scene.hash),
             (OcclusionSource::Load(_), Some(loaded)) => loaded.sidecar.clone(),
             (OcclusionSource::Load(_), None) => return Ok(String::new()),
         };
-        let bytes = files::write_occlusion(&path, values, &sidecar)?;
         let key = self.keys.occlusion(index).to_owned();
+        if let Some(errors) = errors_file(occlusion) {
+            files::write_whole(&plan.out.join(&errors), &occlusion::encode(&found.errors))?;
+            self.cache.record(&errors, &key)?;
+        }
+        let bytes = files::write_occlusion(&plan.out.join(file), &found.values, &sidecar)?;
         self.cache.record(&sidecar_path(file), &key)?;
         self.note_written(file, bytes, &key)?;
         Ok(detail)
-    }
-
-    fn rate(&self, index: usize, vertices: usize, time: Duration) -> String {
-        match &self.plan.occlusions[index].source {
-            OcclusionSource::Compute(Computation { samples: Samples::Fixed(samples), .. }) => {
-                let rays = *samples as f64 * vertices as f64;
-                format!("{} rays, {:.2} million a second", grouped(rays as u64), rays / time.as_secs_f64() / 1e6)
-            }
-            OcclusionSource::Compute(Computation { samples: Samples::Exact, .. }) => {
-                format!("{:.3} ms a vertex", time.as_secs_f64() * 1e3 / vertices.max(1) as f64)
-            }
-            _ => String::new(),
-        }
     }
 
     /// Makes sure that an occlusion's values are known.
@@ -258,22 +250,25 @@ impl Run<'_> {
         let occlusion = &self.plan.occlusions[index];
         let values = match &occlusion.source {
             OcclusionSource::Load(_) => {
-                self.loaded[index].as_mut().map(|loaded| std::mem::take(&mut loaded.values)).unwrap_or_default()
+                let loaded = self.loaded[index].as_mut();
+                let take = |l: &mut Loaded| (std::mem::take(&mut l.values), std::mem::take(&mut l.errors));
+                let (values, errors) = loaded.map(take).unwrap_or_default();
+                Estimates { values, errors, rays: 0 }
             }
             OcclusionSource::Compute(computation) => {
                 // A file that is still fresh holds the values already.
-                let kept = occlusion.file.as_deref().filter(|_| !self.stale.occlusion[index]);
                 let count = scene.mesh.vertices.len();
-                match kept.map(|f| read_values(&self.plan.out.join(f), &scene.hash, count)) {
-                    Some(Ok(kept)) => kept.values,
-                    _ => {
+                let fresh = !self.stale.occlusion[index];
+                match fresh.then(|| kept(&self.plan.out, occlusion, &scene.hash, count)).flatten() {
+                    Some(found) => found,
+                    None => {
                         let start = Instant::now();
                         self.progress.begin(&format!("occlusion {}", occlusion.id), count as u64);
-                        let values = occlude::values(scene.tracer(), computation, self.progress);
+                        let found = method(computation).at_vertices(scene.tracer(), self.progress);
                         self.progress.end();
-                        self.times.entry(StageRef::Occlusion(index)).or_default().1 =
-                            self.rate(index, count, start.elapsed());
-                        values?
+                        let found = found?;
+                        self.times.entry(StageRef::Occlusion(index)).or_default().1 = rate(&found, start.elapsed());
+                        found
                     }
                 }
             }
@@ -342,7 +337,7 @@ impl Run<'_> {
             self.values(o, scene)?;
         }
         let camera = camera::<D>(&render.camera)?;
-        let values = render.occlusion.map(|o| &scene.values[&o][..]);
+        let values = render.occlusion.map(|o| &scene.values[&o]);
         let (bytes, left_out) = files::write_mesh(&plan.out.join(file), scene.mesh, &camera, values)?;
         if left_out > 0 {
             self.report.notes.push(format!(
@@ -357,14 +352,29 @@ impl Run<'_> {
     }
 }
 
+/// How fast values were found.
+fn rate(found: &Estimates, time: Duration) -> String {
+    let rays = match found.rays {
+        0 => String::new(),
+        rays => {
+            let speed = rays as f64 / time.as_secs_f64() / 1e6;
+            format!("{} rays, {speed:.2} million a second, ", grouped(rays))
+        }
+    };
+    match found.errors.len() {
+        0 => rays,
+        _ => format!("{rays}error {:.1e}", found.error()),
+    }
+}
+
 /// The working set of a slab.
 const SLAB_BYTES: usize = 256 << 20;
 
-fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Vec<f32>>) -> Shading<'v> {
+fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Estimates>) -> Shading<'v> {
     let Some(o) = render.occlusion else { return Shading::None };
     match (render.shading, &plan.occlusions[o].source) {
-        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => voxel_shading(computation),
-        (spec::Shading::Flat, _) => Shading::Flat(&values[&o]),
-        _ => Shading::Smooth(&values[&o]),
+        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(method(computation)),
+        (spec::Shading::Flat, _) => Shading::Flat(&values[&o].values),
+        _ => Shading::Smooth(&values[&o].values),
     }
 }

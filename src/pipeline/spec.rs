@@ -93,6 +93,8 @@ pub enum Method {
     Sobol,
     /// Independent random rays, cosine-weighted.
     Random,
+    /// In closed form where few simplices are to be seen, by Sobol points elsewhere.
+    Adaptive,
     /// In closed form, without sampling noise.
     Exact,
     /// As the thesis published it, slips and all, for its figures.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::cache::{Cache, Keys};
+use super::occlude::errors_file;
 use super::plan::{Plan, WritePlan};
 use super::prepare::sidecar_path;
 
@@ -30,7 +31,11 @@ impl Stale {
             png: of("png", |w| w.png.as_deref()),
             vtu: of("vtu", |w| w.vtu.as_deref()),
             occlusion: (plan.occlusions.iter().enumerate())
-                .map(|(i, o)| o.file.as_deref().is_some_and(|f| !kept(f, keys.occlusion(i))))
+                .map(|(i, o)| {
+                    let key = keys.occlusion(i);
+                    o.file.as_deref().is_some_and(|f| !kept(f, key))
+                        || errors_file(o).is_some_and(|f| !cache.is_fresh(&f, key))
+                })
                 .collect(),
         }
     }

@@ -41,7 +41,7 @@ impl<const D: usize> Picture<'_, D> {
     /// The arrays of some layers, in the order of `channels`.
     ///
     /// # Errors
-    /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where [`Shading::Exact`] is too dear.
+    /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where a closed form is too dear.
     pub fn slab(
         &self,
         layers: Range<usize>,

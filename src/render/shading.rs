@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{NOTHING, Picture};
 use crate::geometry::{Cone, Ray, Vector, Vector64, narrow, normal_of, widen};
 use crate::mesh::normals::unit;
-use crate::occlusion::{Error, Settings, Site, ambient_occlusion, exact};
+use crate::occlusion::{Error, Method};
 use crate::progress::Progress;
 
 /// Where the ambient occlusion of a visible point comes from.
@@ -20,9 +20,7 @@ pub enum Shading<'s> {
     /// Interpolated between the simplex's vertices' values, by barycentric coordinates.
     Smooth(&'s [f32]),
     /// Computed at the point itself, on the side that faces the ray: slow, the reference for the other two.
-    Voxel(Settings),
-    /// The same in closed form.
-    Exact(exact::Budget),
+    Voxel(Method),
 }
 
 /// What one voxel sees.
@@ -59,7 +57,7 @@ pub(super) fn shade<const D: usize>(
         for (i, (fragment, &simplex)) in fragments.iter_mut().zip(visible).enumerate() {
             if simplex != NOTHING {
                 // Occlusion at the voxel itself makes a single one take long.
-                if matches!(picture.shading, Shading::Voxel(_) | Shading::Exact(_)) && progress.cancelled() {
+                if matches!(picture.shading, Shading::Voxel(_)) && progress.cancelled() {
                     return Err(Error::Cancelled);
                 }
                 let number = (i + width * (j + height * k)) as u64;
@@ -82,25 +80,16 @@ fn shade_voxel<const D: usize>(
     let ray = picture.camera.voxel_ray(&picture.grid, index);
     let crossing = Cone::of_simplex(&ray.origin, &mesh.corners(simplex)).crossing(&ray.direction);
     let corner = |values: &[f32], i: usize| f64::from(values[mesh.simplices[simplex as usize][i] as usize]);
-    // The visible point and its normal towards the eye.
-    let seen = || {
-        let corners = mesh.corners(simplex).map(|v| widen(&v));
-        let point = (0..D).fold(Vector64::zeros(), |p, i| p + corners[i] * crossing.barycentric[i]);
-        (narrow(&point), facing_normal(&corners, &ray))
-    };
     let value = match &picture.shading {
         Shading::None => 1.0,
         Shading::Flat(values) => ((0..D).map(|i| corner(values, i)).sum::<f64>() / D as f64) as f32,
         Shading::Smooth(values) => (0..D).map(|i| corner(values, i) * crossing.barycentric[i]).sum::<f64>() as f32,
-        Shading::Voxel(settings) => {
-            let (point, normal) = seen();
-            let site = Site::inside_simplex(point, normal, simplex);
-            ambient_occlusion(picture.tracer, &site, settings, number)
-        }
-        Shading::Exact(budget) => {
-            let (point, normal) = seen();
+        Shading::Voxel(method) => {
+            let corners = mesh.corners(simplex).map(|v| widen(&v));
+            let point = (0..D).fold(Vector64::zeros(), |p, i| p + corners[i] * crossing.barycentric[i]);
+            let normal = facing_normal(&corners, &ray);
             let place = || format!("voxel ({}, {}, {})", index[0], index[1], index[2]);
-            exact::at_point(picture.tracer, &point, &normal, simplex, *budget, place)? as f32
+            method.at_point(picture.tracer, &narrow(&point), &normal, simplex, number, place)?.value
         }
     };
     let depth = crossing.t * widen(&ray.direction).norm();

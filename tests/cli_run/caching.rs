@@ -18,7 +18,7 @@ fn a_run_leaves_what_it_promises_and_the_next_one_nothing_new() {
     let out = folder.path("out/small");
     assert_eq!(names(&out), FILES);
     assert_eq!(names(&folder.path("out")), ["small"]);
-    for name in FILES.iter().filter(|name| !name.ends_with(".yaml")) {
+    for name in FILES.iter().filter(|name| !name.ends_with(".yaml") && !name.contains(".error.")) {
         assert!(said.contains(&format!("\n  {name}")), "{said}");
     }
     assert!(!said.contains("unchanged"));
@@ -76,12 +76,14 @@ fn outputs_that_were_touched_are_made_again() {
     let out = folder.path("out/small");
     let before = contents(&out);
     for name in FILES.iter().filter(|name| **name != "ao.f32.yaml") {
+        // Values and their errors are made together, and told as one.
+        let told = if name.starts_with("ao.") { "ao.f32" } else { name };
         std::fs::remove_file(out.join(name)).unwrap();
         let (made, _, _) = folder.runs(&[]);
-        assert_eq!(made, [*name]);
+        assert_eq!(made, [told]);
         std::fs::write(out.join(name), "edited").unwrap();
         let (made, _, _) = folder.runs(&[]);
-        assert_eq!(made, [*name]);
+        assert_eq!(made, [told]);
         assert_eq!(contents(&out), before, "{name}");
     }
     // The values are of no use without what stands beside them.

@@ -15,6 +15,7 @@ fn loaded_occlusion() {
         (std::fs::read(first.join("ao.f32")).unwrap(), std::fs::read(first.join("ao.f32.yaml")).unwrap());
     keep("kept.f32", &values);
     keep("kept.f32.yaml", &beside);
+    keep("kept.error.f32", &std::fs::read(first.join("ao.error.f32")).unwrap());
     let load = |name: &str| [format!("ao.load={name}"), "ao.samples=".to_owned()];
     let sets = load("kept.f32");
     let load_kept = ["--set", &sets[0], "--set", &sets[1], "--out", "second"];
@@ -46,6 +47,14 @@ fn loaded_occlusion() {
         let sets = load(name);
         folder.fails(&["--set", &sets[0], "--set", &sets[1]], 2, &[name, words, "ao.load"]);
     }
+    // Errors may be missing, but not wrong.
+    keep("bare.f32", &values);
+    keep("bare.f32.yaml", &beside);
+    let sets = load("bare.f32");
+    folder.runs(&["--set", &sets[0], "--set", &sets[1], "--out", "third"]);
+    assert!(!names(&folder.path("third")).contains(&"ao.error.f32".to_owned()));
+    keep("bare.error.f32", &values[1..]);
+    folder.fails(&["--set", &sets[0], "--set", &sets[1]], 2, &["bare.error.f32", "values take", "ao.load"]);
     // A file that was good when it was loaded, and is another mesh's now, isn't taken from the cache.
     keep("kept.f32.yaml", other_mesh.as_bytes());
     let output = folder.run(&load_kept);

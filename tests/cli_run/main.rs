@@ -33,8 +33,17 @@ stages:
   - paraview: {state: figure.py, screenshot: figure.png}
 ";
 /// What the pipeline leaves, but for the cache's own file.
-const FILES: [&str; 8] =
-    ["ao.f32", "ao.f32.yaml", "figure.py", "image.raw", "image.vti", "plain.vti", "scene.vtu", "slices.png"];
+const FILES: [&str; 9] = [
+    "ao.error.f32",
+    "ao.f32",
+    "ao.f32.yaml",
+    "figure.py",
+    "image.raw",
+    "image.vti",
+    "plain.vti",
+    "scene.vtu",
+    "slices.png",
+];
 
 /// A folder with the pipeline in it, gone after the test.
 struct Folder(tempfile::TempDir);

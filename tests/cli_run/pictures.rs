@@ -21,7 +21,7 @@ fn the_number_of_threads_changes_no_byte() {
     }
     folder.runs(&["--out", "all"]);
     let one = contents(&folder.path("1"));
-    assert_eq!(one.len(), FILES.len() + 10);
+    assert_eq!(one.len(), FILES.len() + 11);
     for other in ["2", "5", "all"] {
         let other = contents(&folder.path(other));
         assert!(one.keys().eq(other.keys()));

@@ -1,5 +1,4 @@
-//! The closed form: against very many rays on every scene, and against values known by other means all the way from
-//! YAML to the file.
+//! The closed form against very many rays, on every scene.
 
 use ao4d::accel::Tracer;
 use ao4d::mesh::Incidence;

@@ -1,4 +1,4 @@
-//! The methods of occlusion against each other, on the scenes of the pipelines and on random ones.
+//! The methods of occlusion against each other and against the truth, on the scenes of the pipelines and on random ones.
 
 /// Tests that are generic in the dimension, each run in both.
 macro_rules! in_3d_and_4d {
@@ -10,5 +10,7 @@ macro_rules! in_3d_and_4d {
     )* };
 }
 
+mod errors;
 mod exact;
+mod pipelines;
 mod scenes;

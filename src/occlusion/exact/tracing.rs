@@ -12,6 +12,35 @@ use crate::mesh::Incidence;
 use crate::occlusion::Error;
 use crate::progress::Progress;
 
+/// The value at a vertex as [`at_vertex`] gives it, if at most `most` simplices rise above its horizon and their view
+/// stays within the budget.
+pub fn at_vertex_if_simple<const D: usize>(
+    tracer: &Tracer<D>,
+    incidence: &Incidence,
+    vertex: u32,
+    most: usize,
+    budget: Budget,
+) -> Option<f64> {
+    if tracer.mesh().normals[vertex as usize].amax() == 0.0 {
+        return Some(1.0);
+    }
+    let view = view_of_vertex(tracer, incidence, vertex, most)?;
+    Some(view.visible_fraction(budget).ok()?.clamp(0.0, 1.0))
+}
+
+/// The same for [`at_point`].
+pub fn at_point_if_simple<const D: usize>(
+    tracer: &Tracer<D>,
+    position: &Vector<D>,
+    normal: &Vector<D>,
+    ignored: u32,
+    most: usize,
+    budget: Budget,
+) -> Option<f64> {
+    let view = view_of_point(tracer, position, normal, ignored, most)?;
+    Some(view.visible_fraction(budget).ok()?.clamp(0.0, 1.0))
+}
+
 /// The value at a vertex, within [0, 1]. A vertex that belongs to no simplex has the value 1.
 ///
 /// # Errors
@@ -22,26 +51,8 @@ pub fn at_vertex<const D: usize>(
     vertex: u32,
     budget: Budget,
 ) -> Result<f64, Error> {
-    let mesh = tracer.mesh();
-    let (position, normal) = (&mesh.vertices[vertex as usize], &mesh.normals[vertex as usize]);
-    let identity = mesh.identity[vertex as usize];
-    let Some(mut hemisphere) = Hemisphere::new(position, normal) else { return Ok(1.0) };
-    let around = incidence.around(identity);
-    for &simplex in around {
-        let mut others = [*position; D];
-        let corners = mesh.simplices[simplex as usize].into_iter();
-        for (other, v) in others.iter_mut().zip(corners.filter(|&v| mesh.identity[v as usize] != identity)) {
-            *other = mesh.vertices[v as usize];
-        }
-        // The coordinates of a mesh are finite, so nothing is refused.
-        let _ = hemisphere.add_incident(&others[..D - 1]);
-    }
-    above_horizon(tracer.bvh(), position, normal, |simplex| {
-        if around.binary_search(&simplex).is_err() {
-            let _ = hemisphere.add(&mesh.corners(simplex));
-        }
-    });
-    value(&hemisphere, budget, || format!("vertex {vertex}"))
+    let view = view_of_vertex(tracer, incidence, vertex, usize::MAX);
+    view.map_or(Ok(1.0), |hemisphere| value(&hemisphere, budget, || format!("vertex {vertex}")))
 }
 
 /// The value at a point inside the simplex `ignored`, on the side that its normal points to, within [0, 1]. `place`
@@ -57,13 +68,8 @@ pub fn at_point<const D: usize>(
     budget: Budget,
     place: impl FnOnce() -> String,
 ) -> Result<f64, Error> {
-    let Some(mut hemisphere) = Hemisphere::new(position, normal) else { return Ok(1.0) };
-    above_horizon(tracer.bvh(), position, normal, |simplex| {
-        if simplex != ignored {
-            let _ = hemisphere.add(&tracer.mesh().corners(simplex));
-        }
-    });
-    value(&hemisphere, budget, place)
+    let view = view_of_point(tracer, position, normal, ignored, usize::MAX);
+    view.map_or(Ok(1.0), |hemisphere| value(&hemisphere, budget, place))
 }
 
 /// The value at every vertex of the mesh, in vertex order: the same on any number of threads.
@@ -100,8 +106,62 @@ fn value<const D: usize>(
     }
 }
 
-/// Calls `visit` for the items whose boxes may reach above the horizon.
-fn above_horizon<const D: usize>(bvh: &Bvh<D>, position: &Vector<D>, normal: &Vector<D>, mut visit: impl FnMut(u32)) {
+/// The hemisphere over a vertex with all that occludes it. None if more than `most` simplices do, or if there is no normal.
+fn view_of_vertex<const D: usize>(
+    tracer: &Tracer<D>,
+    incidence: &Incidence,
+    vertex: u32,
+    most: usize,
+) -> Option<Hemisphere<D>> {
+    let mesh = tracer.mesh();
+    let (position, normal) = (&mesh.vertices[vertex as usize], &mesh.normals[vertex as usize]);
+    let identity = mesh.identity[vertex as usize];
+    let mut hemisphere = Hemisphere::new(position, normal)?;
+    let around = incidence.around(identity);
+    for &simplex in around {
+        let mut others = [*position; D];
+        let corners = mesh.simplices[simplex as usize].into_iter();
+        for (other, v) in others.iter_mut().zip(corners.filter(|&v| mesh.identity[v as usize] != identity)) {
+            *other = mesh.vertices[v as usize];
+        }
+        // The coordinates of a mesh are finite, so nothing is refused.
+        let _ = hemisphere.add_incident(&others[..D - 1]);
+    }
+    let few = above_horizon(tracer.bvh(), position, normal, |simplex| {
+        if around.binary_search(&simplex).is_err() {
+            let _ = hemisphere.add(&mesh.corners(simplex));
+        }
+        hemisphere.occluders() <= most
+    });
+    few.then_some(hemisphere)
+}
+
+/// The same over a point inside a simplex.
+fn view_of_point<const D: usize>(
+    tracer: &Tracer<D>,
+    position: &Vector<D>,
+    normal: &Vector<D>,
+    ignored: u32,
+    most: usize,
+) -> Option<Hemisphere<D>> {
+    let mut hemisphere = Hemisphere::new(position, normal)?;
+    let few = above_horizon(tracer.bvh(), position, normal, |simplex| {
+        if simplex != ignored {
+            let _ = hemisphere.add(&tracer.mesh().corners(simplex));
+        }
+        hemisphere.occluders() <= most
+    });
+    few.then_some(hemisphere)
+}
+
+/// Calls `visit` for the items whose boxes may reach above the horizon, as long as it returns true; returns whether it
+/// always did.
+fn above_horizon<const D: usize>(
+    bvh: &Bvh<D>,
+    position: &Vector<D>,
+    normal: &Vector<D>,
+    mut visit: impl FnMut(u32) -> bool,
+) -> bool {
     let mut open: Vec<u32> = if bvh.nodes.is_empty() { vec![] } else { vec![0] };
     while let Some(index) = open.pop() {
         let node = &bvh.nodes[index as usize];
@@ -112,9 +172,12 @@ fn above_horizon<const D: usize>(bvh: &Bvh<D>, position: &Vector<D>, normal: &Ve
             open.extend([node.first + 1, node.first]);
         } else {
             let first = node.first as usize;
-            bvh.order[first..first + node.count as usize].iter().for_each(|&item| visit(item));
+            if !bvh.order[first..first + node.count as usize].iter().all(|&item| visit(item)) {
+                return false;
+            }
         }
     }
+    true
 }
 
 /// Whether some corner of a box may lie above the hyperplane through `position`: n . (x - p) > 0, but for rounding.

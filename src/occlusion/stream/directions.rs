@@ -56,6 +56,9 @@ pub(super) struct Rays<const D: usize> {
     pub offset: [[f32; BLOCK]; D],
     /// The cosine to the normal.
     pub height: [f32; BLOCK],
+    /// The place of each ray in the sequence, counted from the block's first: of Sobol' points of a whole block, in the
+    /// order of their indices, which keeps aligned runs of 2^k rays together.
+    pub number: [u8; BLOCK],
     /// Around the directions of each group.
     pub cones: [GroupCone<D>; GROUPS],
 }
@@ -68,6 +71,7 @@ impl<const D: usize> Rays<D> {
             absolute: [[0.0; BLOCK]; D],
             offset: [[0.0; BLOCK]; D],
             height: [0.0; BLOCK],
+            number: [0; BLOCK],
             cones: [GroupCone { axis: [0.0; D], cosine: 0.0, sine: 1.0 }; GROUPS],
         }
     }
@@ -108,7 +112,8 @@ impl<const D: usize> Rays<D> {
                 sequence.next = sequence.next.wrapping_add(count as u32);
             }
         }
-        self.lift(&in_order::<D>(&points, count), frame);
+        let points = in_order::<D>(&points, count, &mut self.number);
+        self.lift(&points, frame);
     }
 
     /// Points of the cube onto the ball, onto the hemisphere, into the frame.
@@ -148,7 +153,13 @@ impl<const D: usize> Rays<D> {
         for (i, direction) in directions.iter().enumerate().take(BLOCK) {
             (0..D).for_each(|k| self.direction[k][i] = direction[k]);
             self.height[i] = 0.0;
+            self.number[i] = i as u8;
         }
+    }
+
+    /// The bits of a set of rays by their place in the sequence.
+    pub fn in_sequence(&self, set: u64) -> u64 {
+        (0..BLOCK).fold(0, |word, i| word | (set >> i & 1) << (self.number[i] % BLOCK as u8))
     }
 
     /// Completes the directions by what box tests need. `origin` is in the coordinates of the boxes.
@@ -240,7 +251,7 @@ impl<const D: usize> Rays<D> {
 /// The points cell by cell of a grid of 64 cells along Morton's curve, so that neighbours in a block go to the same
 /// parts of the scene.
 #[inline(always)]
-fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize) -> [[f32; BLOCK]; 3] {
+fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize, number: &mut [u8; BLOCK]) -> [[f32; BLOCK]; 3] {
     // Bits of the cells along an axis, spread apart to be joined.
     const SPREAD_2: [u8; 8] = [0, 1, 4, 5, 16, 17, 20, 21];
     const SPREAD_3: [u8; 4] = [0, 1, 8, 9];
@@ -269,6 +280,7 @@ fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize) -> [[f32; 
         let end = &mut ends[key as usize % BLOCK];
         *end -= 1;
         let place = *end as usize % BLOCK;
+        number[place] = i as u8;
         for d in 0..D - 1 {
             ordered[d][place] = points[d][i];
         }

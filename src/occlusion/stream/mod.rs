@@ -29,7 +29,8 @@ use lanes::{Lanes, Portable};
 use question::Question;
 use traverse::Traversal;
 
-use super::{Sequence, Settings, Site, ambient_occlusion};
+use super::estimate::Tally;
+use super::{Estimate, Sampler, Sequence, Settings, Site, Target, estimate_at};
 use crate::accel::Tracer;
 use crate::geometry::{Frame, Vector};
 use crate::mesh::Incidence;
@@ -45,7 +46,7 @@ pub struct Stream<const D: usize> {
 
 /// Rays to be traced from one point.
 enum Source<'a, const D: usize> {
-    Sequence { sequence: Sequence, frame: Frame<D>, samples: u32 },
+    Sequence { sequence: Sequence, frame: Frame<D>, samples: u32, target: Option<Target> },
     Directions(&'a [Vector<D>]),
 }
 
@@ -65,26 +66,38 @@ impl<const D: usize> Stream<D> {
         Self { level, rays: Box::new(Rays::new()), fold: Fold::new(), traversal: Traversal::new() }
     }
 
-    /// The value at a vertex, as [`ambient_occlusion`] gives it for [`Site::at_vertex`].
+    /// The value at a vertex, as [`super::ambient_occlusion`] gives it for [`Site::at_vertex`].
     pub fn at_vertex(&mut self, tracer: &Tracer<D>, incidence: &Incidence, settings: &Settings, vertex: u32) -> f32 {
+        self.estimate_at_vertex(tracer, incidence, settings, None, vertex).value
+    }
+
+    /// The value at a vertex and its error, as [`super::estimate_at`] gives them for [`Site::at_vertex`].
+    pub fn estimate_at_vertex(
+        &mut self,
+        tracer: &Tracer<D>,
+        incidence: &Incidence,
+        settings: &Settings,
+        target: Option<Target>,
+        vertex: u32,
+    ) -> Estimate {
         let mesh = tracer.mesh();
         let (position, normal) = (mesh.vertices[vertex as usize], mesh.normals[vertex as usize]);
         if normal.amax() == 0.0 {
-            return 1.0;
+            return Estimate::known(1.0);
         }
         if !tracer.wide().serves(&position) {
             let site = Site::at_vertex(tracer, incidence, vertex);
-            return ambient_occlusion(tracer, &site, settings, u64::from(vertex));
+            return estimate_at(tracer, &site, settings, target, u64::from(vertex));
         }
         let question = Question::new(tracer, position, normal, settings.max_distance, None);
         let source = Source::Sequence {
             sequence: Sequence::new(settings.sampler, settings.seed, u64::from(vertex)),
             frame: Frame::new(&normal),
             samples: settings.samples,
+            target,
         };
         let identity = mesh.identity[vertex as usize];
-        let blocked = self.blocked(&question, Some((normal, identity)), incidence.around(identity), source);
-        (f64::from(settings.samples - blocked) / f64::from(settings.samples)) as f32
+        self.traced(&question, Some((normal, identity)), incidence.around(identity), source).estimate()
     }
 
     /// How many of the rays from a point in these directions, each of length 1, hit a simplex other than `ignored`
@@ -107,74 +120,75 @@ impl<const D: usize> Stream<D> {
         let on_side = directions.iter().all(|d| d.dot(&normal) > 1e-5);
         let normal = if on_side { normal } else { Vector::zeros() };
         let question = Question::new(tracer, *origin, normal, limit, ignored);
-        self.blocked(&question, None, &[], Source::Directions(directions))
+        let tally = self.traced(&question, None, &[], Source::Directions(directions));
+        tally.rays() - tally.escaped()
     }
 
     /// Chooses the code compiled for the level.
-    fn blocked(
+    fn traced(
         &mut self,
         question: &Question<D>,
         vertex: Option<(Vector<D>, u32)>,
         around: &[u32],
         source: Source<D>,
-    ) -> u32 {
+    ) -> Tally {
         match self.level {
-            Level::Portable => blocked::<Portable, D>(self, question, vertex, around, source),
+            Level::Portable => traced::<Portable, D>(self, question, vertex, around, source),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `new` has checked that the processor has these instructions.
-            Level::Avx2 => unsafe { blocked_avx2(self, question, vertex, around, source) },
+            Level::Avx2 => unsafe { traced_avx2(self, question, vertex, around, source) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
-            Level::Avx512 => unsafe { blocked_avx512(self, question, vertex, around, source) },
+            Level::Avx512 => unsafe { traced_avx512(self, question, vertex, around, source) },
             #[cfg(not(target_arch = "x86_64"))]
-            _ => blocked::<Portable, D>(self, question, vertex, around, source),
+            _ => traced::<Portable, D>(self, question, vertex, around, source),
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn blocked_avx2<const D: usize>(
+fn traced_avx2<const D: usize>(
     stream: &mut Stream<D>,
     question: &Question<D>,
     vertex: Option<(Vector<D>, u32)>,
     around: &[u32],
     source: Source<D>,
-) -> u32 {
-    blocked::<x86::Avx2, D>(stream, question, vertex, around, source)
+) -> Tally {
+    traced::<x86::Avx2, D>(stream, question, vertex, around, source)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512bw,avx512dq,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn blocked_avx512<const D: usize>(
+fn traced_avx512<const D: usize>(
     stream: &mut Stream<D>,
     question: &Question<D>,
     vertex: Option<(Vector<D>, u32)>,
     around: &[u32],
     source: Source<D>,
-) -> u32 {
-    blocked::<x86::Avx512, D>(stream, question, vertex, around, source)
+) -> Tally {
+    traced::<x86::Avx512, D>(stream, question, vertex, around, source)
 }
 
-/// Counts the rays that are blocked. `vertex` is the normal and identity of the vertex that the rays start from, if it is
+/// Counts the rays that escape. `vertex` is the normal and identity of the vertex that the rays start from, if it is
 /// one, and `around` the simplices that have it as a corner.
 #[inline(always)]
-fn blocked<L: Lanes, const D: usize>(
+fn traced<L: Lanes, const D: usize>(
     stream: &mut Stream<D>,
     question: &Question<D>,
     vertex: Option<(Vector<D>, u32)>,
     around: &[u32],
     mut source: Source<D>,
-) -> u32 {
+) -> Tally {
     match vertex {
         Some((normal, identity)) => stream.fold.set::<L>(question, normal, identity, around),
         None => stream.fold.clear(),
     }
-    let total = match &source {
-        Source::Sequence { samples, .. } => *samples as usize,
-        Source::Directions(directions) => directions.len(),
+    let (total, sampler) = match &source {
+        Source::Sequence { samples, sequence, .. } => (*samples as usize, sequence.sampler()),
+        Source::Directions(directions) => (directions.len(), Sampler::Random),
     };
-    let mut blocked = 0;
+    let mut tally = Tally::new(sampler);
     for first in (0..total).step_by(BLOCK) {
         let count = BLOCK.min(total - first);
         match &mut source {
@@ -185,7 +199,13 @@ fn blocked<L: Lanes, const D: usize>(
         let alive = u64::MAX >> (BLOCK - count);
         let hidden = stream.fold.hidden::<L>(question, &stream.rays, around, alive);
         let hit = stream.traversal.blocked::<L>(question, &stream.rays, alive & !hidden);
-        blocked += (hidden | hit).count_ones();
+        let open = alive & !(hidden | hit);
+        tally.add(if tally.is_fine() { stream.rays.in_sequence(open) } else { open }, count as u32);
+        if let Source::Sequence { target: Some(target), .. } = &source
+            && target.is_met(&tally)
+        {
+            break;
+        }
     }
-    blocked
+    tally
 }

@@ -32,9 +32,7 @@ use super::error::Invalid;
 use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading};
 
 /// The methods of occlusion that this version has.
-pub const METHODS: &[Method] = &[Method::Sobol, Method::Random, Method::Exact, Method::AsPublished];
-/// Whether this version can aim at an error instead of a number of samples.
-pub const HAS_TARGET_ERROR: bool = false;
+pub const METHODS: &[Method] = &[Method::Sobol, Method::Random, Method::Adaptive, Method::Exact, Method::AsPublished];
 /// The most samples a vertex.
 pub const MAX_SAMPLES: u64 = 1 << 24;
 /// The most pieces that a vertex's view may be cut into.

@@ -1,10 +1,12 @@
 //! Scenes, and the occlusion at their vertices: ranges, defaults, what they work on.
 
+use std::path::Path;
+
 use super::range::positive;
 use super::resolve::Resolver;
 use super::{
-    Computation, HAS_TARGET_ERROR, MAX_CONES, MAX_OBJECTS, MAX_SAMPLES, METHODS, NO_SCENE, OcclusionPlan,
-    OcclusionSource, Samples, ScenePlan, StageRef,
+    Computation, MAX_CONES, MAX_OBJECTS, MAX_SAMPLES, METHODS, NO_SCENE, OcclusionPlan, OcclusionSource, Samples,
+    ScenePlan, StageRef,
 };
 use crate::occlusion::exact;
 use crate::pipeline::error::Invalid;
@@ -71,6 +73,8 @@ pub(super) fn occlusion(
             let key = format!("{path}.file");
             let file = resolver.outputs.claim(&key, name, Some("f32"))?;
             resolver.outputs.claim(&key, &format!("{name}.yaml"), None)?;
+            let errors = Path::new(name).with_extension("error.f32");
+            resolver.outputs.claim(&key, &errors.to_string_lossy(), None)?;
             Some(file)
         }
     };
@@ -108,10 +112,7 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
         (None, None) => Samples::Fixed(256),
         (None, Some(error)) => {
             if !(error > 0.0 && error < 1.0) {
-                return refuse("target_error", format!("expected an error above 0 and below 1, found {error:?}"));
-            }
-            if !HAS_TARGET_ERROR {
-                return refuse("target_error", "is not available in this version; give `samples`".into());
+                return refuse("target_error", format!("expected an error above 0 and below 1, found {error}"));
             }
             Samples::Target { error, max_samples: count("max_samples", spec.max_samples.unwrap_or(65_536))? }
         }
@@ -128,6 +129,9 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
     } else {
         samples
     };
+    if method == Method::AsPublished && spec.target_error.is_some() {
+        return refuse("target_error", "`as_published` aims at no error, which it doesn't know; give `samples`".into());
+    }
     let max_cones = match spec.max_cones {
         None => exact::Budget::default().cones as u64,
         Some(n @ 1..=MAX_CONES) => n,
@@ -136,9 +140,12 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
     if spec.max_cones.is_some() && method != Method::Exact {
         resolver.warn(format!("{path}.max_cones"), "has no effect without `method: exact`");
     }
-    if spec.max_distance.is_some() && method == Method::Exact {
-        let message = "`exact` has its closed form for all distances only; leave this out, or use `method: sobol`";
-        return refuse("max_distance", message.into());
+    if spec.max_distance.is_some() && matches!(method, Method::Exact | Method::Adaptive) {
+        let method = method.as_str();
+        return refuse(
+            "max_distance",
+            format!("`{method}` counts hits at all distances; leave this out, or use `method: sobol`"),
+        );
     }
     let distance = spec.max_distance.map(|d| positive(&format!("{path}.max_distance"), d));
     let seed = spec.seed.unwrap_or(resolver.plan.seed);
@@ -151,6 +158,7 @@ impl Method {
         match self {
             Method::Sobol => "sobol",
             Method::Random => "random",
+            Method::Adaptive => "adaptive",
             Method::Exact => "exact",
             Method::AsPublished => "as_published",
         }

@@ -1,0 +1,122 @@
+//! The ways to ambient occlusion behind one door: at all vertices, or at a visible point.
+//!
+//! - Rays, a fixed number or until a target is met ([`Method::Sampled`]);
+//! - the closed form ([`Method::Exact`]);
+//! - the closed form where the view is simple, rays where it isn't ([`Method::Adaptive`]). Which of the two is decided by
+//!   the scene alone, never by a ray, so the values have no bias. Where few simplices are to be seen there is the most
+//!   to gain, as their silhouettes are long for what they cover, and points sent elsewhere say little about them;
+//! - the algorithm as it was published ([`Method::AsPublished`]), whose errors are those of its rays, not of its slips.
+
+use super::exact::{self, Budget};
+use super::vertices::everywhere;
+use super::{
+    Error, Estimate, Estimates, Level, Settings, Site, Slips, Stream, Target, as_published, estimate_at,
+    estimate_vertices,
+};
+use crate::accel::Tracer;
+use crate::geometry::Vector;
+use crate::mesh::Incidence;
+use crate::progress::Progress;
+
+/// A view is simple if at most so many simplices rise above the horizon,
+const SIMPLE: usize = 64;
+
+/// and cut each other into at most so many pieces: some milliseconds.
+const PIECES: Budget = Budget { cones: 8192 };
+
+/// Vertices between two looks at whether to go on, where some may take milliseconds.
+const BATCH: usize = 4;
+
+/// A way to ambient occlusion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// By `settings.samples` rays, or fewer if they meet the target.
+    Sampled(Settings, Option<Target>),
+    /// In closed form where that is cheap, else by rays; always by rays if distances are limited.
+    Adaptive(Settings, Option<Target>),
+    /// In closed form.
+    Exact(Budget),
+    /// The thesis's algorithm with these slips, by `settings.samples` rays.
+    AsPublished(Settings, Slips),
+}
+
+impl Method {
+    /// The value at every vertex.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` says so; [`Error::OverBudget`] if the closed form is too dear.
+    pub fn at_vertices<const D: usize>(&self, tracer: &Tracer<D>, progress: &dyn Progress) -> Result<Estimates, Error> {
+        match *self {
+            Self::Sampled(settings, target) => {
+                Ok(estimate_vertices(Level::best(), tracer, &settings, target, progress)?)
+            }
+            Self::Adaptive(settings, target) => {
+                let incidence = Incidence::new(tracer.mesh());
+                let estimate =
+                    |stream: &mut Stream<D>, vertex| adaptive(stream, tracer, &incidence, &settings, target, vertex);
+                Ok(everywhere(tracer, BATCH, progress, Stream::default, estimate)?)
+            }
+            Self::Exact(budget) => {
+                let values = exact::at_vertices(tracer, budget, progress)?;
+                let errors = vec![0.0; values.len()];
+                Ok(Estimates { values: values.into_iter().map(|v| v as f32).collect(), errors, rays: 0 })
+            }
+            Self::AsPublished(settings, slips) => {
+                let values = as_published(tracer, slips, &settings, progress)?;
+                let errors = values.iter().map(|&value| Estimate::independent(value, settings.samples).error).collect();
+                let rays = values.len() as u64 * u64::from(settings.samples);
+                Ok(Estimates { values, errors, rays })
+            }
+        }
+    }
+
+    /// The value at a visible point inside a simplex, on the side that its normal points to. `number` tells points
+    /// apart, `place` names this one in errors. The thesis has no such values; plain rays stand in for its own.
+    ///
+    /// # Errors
+    /// [`Error::OverBudget`] if the closed form is too dear.
+    pub fn at_point<const D: usize>(
+        &self,
+        tracer: &Tracer<D>,
+        position: &Vector<D>,
+        normal: &Vector<D>,
+        simplex: u32,
+        number: u64,
+        place: impl FnOnce() -> String,
+    ) -> Result<Estimate, Error> {
+        let sampled = |settings: &Settings, target| {
+            let site = Site::inside_simplex(*position, *normal, simplex);
+            estimate_at(tracer, &site, settings, target, number)
+        };
+        Ok(match self {
+            Self::Sampled(settings, target) => sampled(settings, *target),
+            Self::AsPublished(settings, _) => sampled(settings, None),
+            Self::Adaptive(settings, target) => {
+                let closed = || exact::at_point_if_simple(tracer, position, normal, simplex, SIMPLE, PIECES);
+                let known = if settings.max_distance == f32::INFINITY { closed() } else { None };
+                known.map_or_else(|| sampled(settings, *target), Estimate::known)
+            }
+            Self::Exact(budget) => Estimate::known(exact::at_point(tracer, position, normal, simplex, *budget, place)?),
+        })
+    }
+}
+
+/// The value at a vertex in closed form where that is cheap, else by rays.
+pub fn adaptive<const D: usize>(
+    stream: &mut Stream<D>,
+    tracer: &Tracer<D>,
+    incidence: &Incidence,
+    settings: &Settings,
+    target: Option<Target>,
+    vertex: u32,
+) -> Estimate {
+    let unlimited = settings.max_distance == f32::INFINITY;
+    let known = unlimited.then(|| exact::at_vertex_if_simple(tracer, incidence, vertex, SIMPLE, PIECES)).flatten();
+    known.map_or_else(|| stream.estimate_at_vertex(tracer, incidence, settings, target, vertex), Estimate::known)
+}
+
+impl From<Settings> for Method {
+    fn from(settings: Settings) -> Self {
+        Self::Sampled(settings, None)
+    }
+}
