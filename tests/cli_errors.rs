@@ -131,9 +131,34 @@ fn ranges() {
         ("samples: 16", "samples: ^0", "stages[1].occlusion.samples: expected 1 to 16777216 samples, found 0"),
         ("samples: 16", "max_distance: ^0", "stages[1].occlusion.max_distance: expected a number above 0, found 0"),
         (
+            "samples: 16, file: ao.f32}\n  - render:\n      id: image",
+            "method: as_published}\n  - render:\n      shading: ^voxel",
+            "stages[2].render.shading: `as_published` has values at vertices only; take `flat`, as the thesis did",
+        ),
+        (
             "samples: 16",
-            "target_error: ^0.01",
-            "stages[1].occlusion.target_error: is not available in this version; give `samples`",
+            "target_error: ^0",
+            "stages[1].occlusion.target_error: expected an error above 0 and below 1, found 0",
+        ),
+        (
+            "samples: 16",
+            "target_error: ^-0.01",
+            "stages[1].occlusion.target_error: expected an error above 0 and below 1, found -0.01",
+        ),
+        (
+            "samples: 16",
+            "method: exact, max_distance: ^2",
+            "stages[1].occlusion.max_distance: `exact` counts hits at all distances; leave this out, or use `method: sobol`",
+        ),
+        (
+            "samples: 16",
+            "method: as_published, target_error: ^0.1",
+            "stages[1].occlusion.target_error: `as_published` aims at no error, which it doesn't know; give `samples`",
+        ),
+        (
+            "samples: 16",
+            "method: exact, max_cones: ^0",
+            "stages[1].occlusion.max_cones: expected 1 to 1000000000 cones, found 0",
         ),
         (
             "samples: 16",
@@ -334,7 +359,7 @@ fn bad_command_lines() {
         (&["info", "."], ".: there is no such file"),
         (&["check", "missing.yaml"], "missing.yaml: cannot read the pipeline: "),
         (&["check", "."], ".: cannot read the pipeline: "),
-        (&["study", "p.yaml"], "`study` is not available in this version"),
+        (&["study", "p.yaml", "p.yaml"], "expected one pipeline"),
     ] {
         let output = ao4d(folder.path(), arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

@@ -1,9 +1,11 @@
 //! `ao4d study`: error against time of the occlusion methods on a pipeline's scene.
 
+use ao4d::pipeline::{RunError, study};
 use clap::Args;
 
 use super::console::Console;
 use super::options::PipelineOptions;
+use super::watch::Watch;
 use super::{Failure, Outcome};
 
 /// What `study` takes.
@@ -15,7 +17,17 @@ pub struct Study {
 
 impl Study {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
-        let _checked_first = self.options.load(console)?;
-        Err(Failure::refused("`study` is not available in this version"))
+        let (pipeline, settings) = self.options.load(console)?;
+        let watch = Watch::new(console)?;
+        let study = study(&pipeline, &settings, &watch).map_err(|error| match error {
+            RunError::Refused(error) => Failure::Refused(Box::new(error)),
+            RunError::Cancelled(_) => Failure::Cancelled,
+            error => Failure::Failed(Box::new(error)),
+        })?;
+        console.result(&study.markdown())?;
+        for file in &study.files {
+            console.note(&format!("written: {}", file.display()));
+        }
+        Ok(Outcome::Done)
     }
 }

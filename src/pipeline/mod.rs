@@ -28,6 +28,7 @@ mod run;
 mod schema;
 mod settings;
 pub mod spec;
+mod study;
 mod suggest;
 mod work;
 mod yaml;
@@ -45,6 +46,7 @@ pub use report::{FileReport, Report, StageTime};
 pub use run::{RunError, run};
 pub use schema::schema;
 pub use settings::{Backend, BackendError, Settings};
+pub use study::{Study, study};
 
 /// A plan, and the text it was made from, which later complaints cite.
 #[derive(Clone, Debug)]

@@ -1,0 +1,225 @@
+//! Methods against the truth, with more and more rays.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::Errors;
+use crate::accel::Tracer;
+use crate::mesh::Incidence;
+use crate::occlusion::exact::{self, Budget};
+use crate::occlusion::{AsPublished, Cancelled, Error, Sampler, Settings, Slips, Stream, adaptive};
+use crate::pipeline::RunError;
+use crate::progress::Progress;
+
+/// At most so many vertices are looked at.
+const VERTICES: usize = 200;
+/// A rung is repeated until so many rays were traced, but not more often than [`REPETITIONS`].
+pub const RAYS: usize = 1 << 19;
+const REPETITIONS: usize = 128;
+/// Where exact values would take more than this, about a tenth of a second, a long run stands for them.
+const BUDGET: Budget = Budget { cones: 100_000 };
+/// Rays of a long run.
+const LONG_RUN: u32 = 1 << 20;
+/// Tells the seeds of repetitions from those of neighbouring studies.
+const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// A method that is compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contender {
+    /// As the pipeline calls it.
+    pub name: &'static str,
+    way: Way,
+    /// The most rays a vertex.
+    most: u32,
+}
+
+/// What computes a contender's values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    /// Cosine-weighted rays.
+    Rays(Sampler),
+    /// The closed form where it is cheap, Sobol points elsewhere.
+    Adaptive,
+    /// The published algorithm.
+    Published,
+}
+
+/// In the order of the tables.
+pub const CONTENDERS: [Contender; 4] = [
+    Contender { name: "as_published", way: Way::Published, most: 1 << 12 },
+    Contender { name: "random", way: Way::Rays(Sampler::Random), most: 1 << 16 },
+    Contender { name: "sobol", way: Way::Rays(Sampler::Sobol), most: 1 << 16 },
+    Contender { name: "adaptive", way: Way::Adaptive, most: 1 << 16 },
+];
+
+/// What is taken for true.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// Of each vertex that is looked at.
+    pub values: Vec<f64>,
+    /// How many of them are those of a long run.
+    pub long_runs: usize,
+    /// The largest standard error of those, 0 if there are none.
+    pub error: f64,
+    /// Seconds a vertex and thread, of the exact ones; none if there are none.
+    pub seconds: Option<f64>,
+}
+
+/// A vertex's true value.
+struct Found {
+    value: f64,
+    /// Its standard error, if it is that of a long run.
+    error: f64,
+    /// What it took, if it is exact.
+    seconds: Option<f64>,
+}
+
+/// A method with so many rays.
+#[derive(Clone, Debug)]
+pub struct Rung {
+    pub method: &'static str,
+    pub samples: u32,
+    /// With how many seeds.
+    pub repetitions: usize,
+    pub errors: Errors,
+    /// Seconds a vertex and thread.
+    pub seconds: f64,
+    pub rays_per_second: f64,
+}
+
+/// A scene, and the vertices that are looked at.
+#[derive(Debug)]
+pub struct Bench<'t, const D: usize> {
+    pub tracer: &'t Tracer<'t, D>,
+    pub vertices: Vec<u32>,
+    incidence: Incidence,
+    pub seed: u64,
+}
+
+impl<'t, const D: usize> Bench<'t, D> {
+    /// Takes vertices that belong to something, evenly spread over their list. None if there are none.
+    pub fn new(tracer: &'t Tracer<'t, D>, seed: u64) -> Option<Self> {
+        let mesh = tracer.mesh();
+        let incidence = Incidence::new(mesh);
+        let mut vertices: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+        vertices.retain(|&v| !incidence.around(mesh.identity[v as usize]).is_empty());
+        let (count, all) = (vertices.len().min(VERTICES), vertices.len());
+        let vertices: Vec<u32> = (0..count).map(|i| vertices[(2 * i + 1) * all / (2 * count)]).collect();
+        (!vertices.is_empty()).then_some(Self { tracer, vertices, incidence, seed })
+    }
+
+    /// The true values.
+    pub fn truth(&self, progress: &dyn Progress) -> Result<Truth, RunError> {
+        progress.begin("study: exact", self.vertices.len() as u64);
+        let found: Result<Vec<Found>, RunError> = self
+            .vertices
+            .par_iter()
+            .with_max_len(1)
+            .map_init(Stream::default, |stream, &vertex| {
+                if progress.cancelled() {
+                    return Err(Cancelled.into());
+                }
+                let start = Instant::now();
+                let exact = exact::at_vertex(self.tracer, &self.incidence, vertex, BUDGET);
+                let seconds = start.elapsed().as_secs_f64();
+                progress.advance(1);
+                match exact {
+                    Ok(value) => Ok(Found { value, error: 0.0, seconds: Some(seconds) }),
+                    Err(Error::OverBudget { .. }) => {
+                        let settings = self.settings(Sampler::Sobol, LONG_RUN, usize::MAX);
+                        let long = stream.estimate_at_vertex(self.tracer, &self.incidence, &settings, None, vertex);
+                        Ok(Found { value: long.value.into(), error: long.error.into(), seconds: None })
+                    }
+                    Err(error) => Err(error.into()),
+                }
+            })
+            .collect();
+        progress.end();
+        let found = found?;
+        let exact: Vec<f64> = found.iter().filter_map(|f| f.seconds).collect();
+        Ok(Truth {
+            values: found.iter().map(|f| f.value).collect(),
+            long_runs: found.len() - exact.len(),
+            error: found.iter().map(|f| f.error).fold(0.0, f64::max),
+            seconds: (!exact.is_empty()).then(|| exact.iter().sum::<f64>() / exact.len() as f64),
+        })
+    }
+
+    fn settings(&self, sampler: Sampler, samples: u32, repetition: usize) -> Settings {
+        let seed = self.seed.wrapping_add((repetition as u64).wrapping_mul(SEED_STEP));
+        Settings { sampler, samples, seed, max_distance: f32::INFINITY }
+    }
+
+    /// A method on all its rungs: 16 rays, 64, and so on.
+    pub fn climb(&self, contender: Contender, truth: &Truth, progress: &dyn Progress) -> Result<Vec<Rung>, RunError> {
+        let rungs: Vec<u32> = (2..).map(|k| 1 << (2 * k)).take_while(|&samples| samples <= contender.most).collect();
+        progress.begin(&format!("study: {}", contender.name), rungs.len() as u64);
+        let climbed = rungs.into_iter().map(|samples| {
+            if progress.cancelled() {
+                return Err(Cancelled.into());
+            }
+            let repetitions = match contender.way {
+                // The same again, mostly, and dear.
+                Way::Adaptive => 1,
+                _ => (RAYS / samples as usize / self.vertices.len()).clamp(1, REPETITIONS),
+            };
+            let (found, seconds) = self.values(contender, samples, repetitions);
+            progress.advance(1);
+            let rays: u64 = found.iter().map(|f| u64::from(f.1)).sum();
+            let pairs = found.iter().zip(truth.values.iter().cycle());
+            Ok(Rung {
+                method: contender.name,
+                samples,
+                repetitions,
+                errors: Errors::of(pairs.map(|((value, _), truth)| f64::from(*value) - truth)),
+                seconds,
+                rays_per_second: rays as f64 / found.len() as f64 / seconds * rayon::current_num_threads() as f64,
+            })
+        });
+        let climbed = climbed.collect();
+        progress.end();
+        climbed
+    }
+
+    /// All vertices' values with the number of rays asked for each, repetition after repetition; and the seconds a
+    /// vertex and thread.
+    fn values(&self, contender: Contender, samples: u32, repetitions: usize) -> (Vec<(f32, u32)>, f64) {
+        let tasks: Vec<(usize, u32)> =
+            (0..repetitions).flat_map(|r| self.vertices.iter().map(move |&vertex| (r, vertex))).collect();
+        let start = Instant::now();
+        let values: Vec<(f32, u32)> = match contender.way {
+            Way::Rays(sampler) => {
+                let stream = |stream: &mut Stream<D>, &(repetition, vertex): &(usize, u32)| {
+                    let settings = self.settings(sampler, samples, repetition);
+                    (stream.at_vertex(self.tracer, &self.incidence, &settings, vertex), samples)
+                };
+                tasks.par_iter().map_init(Stream::default, stream).collect()
+            }
+            Way::Adaptive => {
+                let value = |stream: &mut Stream<D>, &(repetition, vertex): &(usize, u32)| {
+                    let settings = self.settings(Sampler::Sobol, samples, repetition);
+                    let found = adaptive(stream, self.tracer, &self.incidence, &settings, None, vertex);
+                    (found.value, found.rays)
+                };
+                tasks.par_iter().with_max_len(1).map_init(Stream::default, value).collect()
+            }
+            Way::Published => {
+                let published = AsPublished::new(self.tracer, Slips::PUBLISHED);
+                let value = |&(repetition, vertex): &(usize, u32)| {
+                    (published.at_vertex(vertex, &self.settings(Sampler::Random, samples, repetition)), samples)
+                };
+                tasks.par_iter().map(value).collect()
+            }
+        };
+        let threads = rayon::current_num_threads().min(tasks.len()) as f64;
+        (values, start.elapsed().as_secs_f64() * threads / tasks.len() as f64)
+    }
+
+    /// The values of the published algorithm with other slips.
+    pub fn with_slips(&self, slips: Slips, samples: u32) -> Vec<f32> {
+        let published = AsPublished::new(self.tracer, slips);
+        let settings = self.settings(Sampler::Random, samples, 0);
+        self.vertices.par_iter().map(|&vertex| published.at_vertex(vertex, &settings)).collect()
+    }
+}

@@ -1,0 +1,186 @@
+//! Error against time of the occlusion methods on a pipeline's scene: `study.csv`, `study.md`, `study.svg`.
+//!
+//! What is measured, each in a file of its own:
+//!
+//! - [`ladder`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A rung is repeated with other
+//!   seeds until it has traced [`ladder::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
+//! - [`pictures`]: what becomes of the values in an image: `flat` and `smooth` shading against the value of each visible
+//!   point itself;
+//! - [`precision`]: on how many rays plain Cramer's rule, in `f32` and in `f64`, says something else than exact signs; and
+//!   what each slip of the published algorithm does to its values.
+//!
+//! All is about the vertices or voxels of one scene: that of the pipeline's first `occlusion`. Of a large one some are
+//! taken, evenly spread. How much is computed is bounded by counts, never by the clock, so that the same pipeline gives the
+//! same errors everywhere; only times differ.
+
+mod ladder;
+mod pictures;
+mod plot;
+mod precision;
+mod tables;
+
+use std::path::PathBuf;
+
+use super::build::AnyMesh;
+use super::files::write_whole;
+use super::plan::{OcclusionSource, grouped};
+use super::{Invalid, Pipeline, RunError, Settings};
+use crate::accel::Tracer;
+use crate::mesh::Mesh;
+use crate::progress::Progress;
+use ladder::{Bench, Rung, Truth};
+use pictures::Pictures;
+use precision::{Differing, SlipEffect};
+
+/// What a study found.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// The pipeline's name.
+    name: String,
+    /// 3 or 4.
+    dimension: usize,
+    vertices: usize,
+    simplices: usize,
+    threads: usize,
+    seed: u64,
+    truth: Truth,
+    rungs: Vec<Rung>,
+    slips: Vec<SlipEffect>,
+    differing: Vec<Differing>,
+    pictures: Option<Pictures>,
+    notes: Vec<String>,
+    /// The files it wrote.
+    pub files: Vec<PathBuf>,
+}
+
+impl Study {
+    /// The report, as `study.md` has it.
+    pub fn markdown(&self) -> String {
+        tables::markdown(self)
+    }
+}
+
+/// Studies the scene of a pipeline's first occlusion, and writes `study.csv`, `study.md` and `study.svg`.
+///
+/// # Errors
+/// [`RunError::Refused`] if there is no occlusion, or nothing in its scene; else as [`super::run`].
+pub fn study(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Study, RunError> {
+    let threads = settings.threads.map_or(0, std::num::NonZeroUsize::get);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    pool.install(|| study_here(pipeline, progress))
+}
+
+fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, RunError> {
+    let plan = &pipeline.plan;
+    let refuse = |path: &str, message: &str| RunError::Refused(pipeline.document.refuse(Invalid::new(path, message)));
+    let Some(occlusion) = plan.occlusions.first() else {
+        return Err(refuse("stages", "there is no `occlusion` to study; add one after the scene"));
+    };
+    progress.begin("scene", 0);
+    let prepared = pipeline.prepare(|scene| scene == occlusion.scene);
+    progress.end();
+    let mut notes = Vec::new();
+    let mut seed = plan.seed;
+    if let OcclusionSource::Compute(computation) = &occlusion.source {
+        seed = computation.seed;
+        if computation.max_distance.is_some() {
+            notes.push("`max_distance` is left out: all methods count occluders at any distance.".to_owned());
+        }
+    }
+    if plan.occlusions.len() > 1 {
+        notes.push(format!("The pipeline has several occlusions; this is the scene of the first, `{}`.", occlusion.id));
+    }
+    let empty = || refuse(&plan.scenes[occlusion.scene].path, "the scene is empty: there is no occlusion to study");
+    let mut study = match prepared?.meshes.swap_remove(occlusion.scene) {
+        Some(AnyMesh::Three(mesh)) => of_mesh(pipeline, &mesh, occlusion.scene, seed, progress)?,
+        Some(AnyMesh::Four(mesh)) => of_mesh(pipeline, &mesh, occlusion.scene, seed, progress)?,
+        None => None,
+    }
+    .ok_or_else(empty)?;
+    study.notes = notes;
+    let texts =
+        [("study.csv", tables::csv(&study)), ("study.svg", plot::svg(&study)), ("study.md", tables::markdown(&study))];
+    for (name, text) in texts {
+        write_whole(&plan.out.join(name), text.as_bytes())?;
+        study.files.push(plan.out.join(name));
+    }
+    Ok(study)
+}
+
+/// All measurements on one scene; none if nothing is in it.
+fn of_mesh<const D: usize>(
+    pipeline: &Pipeline,
+    mesh: &Mesh<D>,
+    scene: usize,
+    seed: u64,
+    progress: &dyn Progress,
+) -> Result<Option<Study>, RunError> {
+    let tracer = Tracer::new(mesh);
+    let Some(bench) = Bench::new(&tracer, seed) else { return Ok(None) };
+    let truth = bench.truth(progress)?;
+    let mut rungs = Vec::new();
+    for contender in ladder::CONTENDERS {
+        rungs.extend(bench.climb(contender, &truth, progress)?);
+    }
+    let slips = precision::slips(&bench, &truth, progress)?;
+    let differing = precision::differing(&tracer, seed, progress)?;
+    let render = pipeline.plan.renders.iter().find(|r| r.scene == scene && r.occlusion.is_some());
+    let pictures = render.map(|render| pictures::measure(&tracer, render, seed, progress)).transpose()?.flatten();
+    Ok(Some(Study {
+        name: pipeline.plan.name.clone(),
+        dimension: D,
+        vertices: mesh.vertices.len(),
+        simplices: mesh.simplices.len(),
+        threads: rayon::current_num_threads(),
+        seed,
+        truth,
+        rungs,
+        slips,
+        differing,
+        pictures,
+        notes: Vec::new(),
+        files: Vec::new(),
+    }))
+}
+
+/// How values differ from the true ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Errors {
+    /// Root mean square.
+    rms: f64,
+    /// Largest magnitude.
+    maximum: f64,
+    /// Mean, with its sign.
+    bias: f64,
+}
+
+impl Errors {
+    fn of(differences: impl Iterator<Item = f64>) -> Self {
+        let (mut count, mut squares, mut sum, mut maximum) = (0usize, 0.0, 0.0, 0.0f64);
+        for difference in differences {
+            count += 1;
+            squares += difference * difference;
+            sum += difference;
+            maximum = maximum.max(difference.abs());
+        }
+        let count = count.max(1) as f64;
+        Self { rms: (squares / count).sqrt(), maximum, bias: sum / count }
+    }
+}
+
+/// `12,345 vertices`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{} {what}", grouped(count as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_a_few_differences() {
+        let errors = Errors::of([3.0, -4.0, 0.0, 0.0].into_iter());
+        assert_eq!(errors, Errors { rms: 2.5, maximum: 4.0, bias: -0.25 });
+        assert_eq!(Errors::of(std::iter::empty()), Errors::default());
+    }
+}

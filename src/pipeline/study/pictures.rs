@@ -1,0 +1,164 @@
+//! What the values at vertices are worth in an image.
+//!
+//! `flat` and `smooth` shading spread the vertices' values over each simplex; the reference is the value at each visible
+//! point itself. The image is the pipeline's first of the scene, with fewer voxels.
+
+use std::time::Instant;
+
+use super::Errors;
+use crate::accel::Tracer;
+use crate::occlusion::exact::Budget;
+use crate::occlusion::{self, Error, Method, Sampler, Settings};
+use crate::pipeline::RunError;
+use crate::pipeline::build::camera;
+use crate::pipeline::plan::RenderPlan;
+use crate::progress::{Progress, Silent};
+use crate::render::{Channel, Picture, Shading};
+use crate::volume::{Array, Values};
+
+/// At most about so many voxels.
+const VOXELS: usize = 12_000;
+/// Rays a point of the reference, where it isn't exact.
+const REFERENCE: u32 = 1024;
+/// Scenes with at most so many simplices have an exact reference.
+const EXACT_UP_TO: usize = 100;
+const BUDGET: Budget = Budget { cones: 20_000 };
+
+/// Errors in an image.
+#[derive(Clone, Debug)]
+pub struct Pictures {
+    pub render: String,
+    pub dimensions: [usize; 3],
+    /// Voxels that see something.
+    pub seen: usize,
+    /// How the reference was made.
+    pub reference: String,
+    pub rows: Vec<PictureRow>,
+}
+
+/// One way to shade.
+#[derive(Clone, Debug)]
+pub struct PictureRow {
+    pub shading: &'static str,
+    /// Rays a vertex, or a voxel.
+    pub samples: u32,
+    pub errors: Errors,
+    /// All of it, values and image, on all threads.
+    pub seconds: f64,
+}
+
+/// Fewer voxels in the same proportions, at least one each way.
+fn reduced(dimensions: [usize; 3]) -> [usize; 3] {
+    let axes = dimensions.iter().filter(|&&d| d > 1).count().max(1) as f64;
+    let voxels: f64 = dimensions.iter().map(|&d| d as f64).product();
+    let share = (VOXELS as f64 / voxels).powf(1.0 / axes).min(1.0);
+    dimensions.map(|d| ((d as f64 * share) as usize).max(1))
+}
+
+/// Measures; none if no voxel sees anything.
+pub fn measure<const D: usize>(
+    tracer: &Tracer<D>,
+    render: &RenderPlan,
+    seed: u64,
+    progress: &dyn Progress,
+) -> Result<Option<Pictures>, RunError> {
+    let dimensions = reduced(render.dimensions);
+    let camera = camera::<D>(&render.camera)?;
+    let grid = camera.grid(dimensions);
+    // Each is cancelled by the outer progress, and told as one step of it.
+    let watch = Steps(progress);
+    let image = |shading: Shading| -> Result<Vec<Array>, Error> {
+        let picture = Picture { tracer, camera: camera.clone(), grid, shading };
+        picture.slab(0..dimensions[2], &[Channel::AmbientOcclusion, Channel::Opacity], &watch)
+    };
+    let settings = |samples| Settings { sampler: Sampler::Sobol, samples, seed, max_distance: f32::INFINITY };
+    let vertex_samples = [16, 64, 256, 1024];
+    let voxel_samples = [16, 64, 256];
+    progress.begin("study: pictures", (2 * vertex_samples.len() + voxel_samples.len() + 1) as u64);
+    let small = tracer.mesh().simplices.len() <= EXACT_UP_TO;
+    let (reference, name) = match small.then(|| image(Shading::Voxel(Method::Exact(BUDGET)))) {
+        Some(Ok(arrays)) => (arrays, "exact at each visible point".to_owned()),
+        Some(Err(Error::Cancelled)) => return Err(Error::Cancelled.into()),
+        // Too large, or too rich a view.
+        _ => {
+            let sampled = Settings { seed: !seed, ..settings(REFERENCE) };
+            (image(Shading::Voxel(sampled.into()))?, format!("`voxel` shading by `sobol` with {REFERENCE} rays"))
+        }
+    };
+    progress.advance(1);
+    let (Some(Values::F32(truth)), Some(Values::F32(opacity))) =
+        (reference.first().map(|a| &a.values), reference.get(1).map(|a| &a.values))
+    else {
+        return Ok(None);
+    };
+    let seen: Vec<usize> = (0..truth.len()).filter(|&i| opacity[i] > 0.0).collect();
+    let mut rows = Vec::new();
+    let mut add = |shading: &'static str, samples: u32, seconds: f64, arrays: &[Array]| {
+        if let Some(Values::F32(values)) = arrays.first().map(|a| &a.values) {
+            let errors = Errors::of(seen.iter().map(|&i| f64::from(values[i]) - f64::from(truth[i])));
+            rows.push(PictureRow { shading, samples, errors, seconds });
+        }
+        progress.advance(1);
+    };
+    for shading in ["flat", "smooth"] {
+        for samples in vertex_samples {
+            let (arrays, seconds) = timed(|| {
+                let values = occlusion::at_vertices(tracer, &settings(samples), &watch)?;
+                image(if shading == "flat" { Shading::Flat(&values) } else { Shading::Smooth(&values) })
+            })?;
+            add(shading, samples, seconds, &arrays);
+        }
+    }
+    for samples in voxel_samples {
+        let (arrays, seconds) = timed(|| image(Shading::Voxel(settings(samples).into())))?;
+        add("voxel", samples, seconds, &arrays);
+    }
+    progress.end();
+    let pictures = Pictures { render: render.id.clone(), dimensions, seen: seen.len(), reference: name, rows };
+    Ok((pictures.seen > 0).then_some(pictures))
+}
+
+/// What comes out of it, and the least seconds it takes; what is over soon is done again, as the first time is slow.
+fn timed<T>(work: impl Fn() -> Result<T, Error>) -> Result<(T, f64), Error> {
+    let began = Instant::now();
+    let mut least = f64::INFINITY;
+    loop {
+        let start = Instant::now();
+        let result = work()?;
+        least = least.min(start.elapsed().as_secs_f64());
+        if began.elapsed().as_secs_f64() > 0.1 {
+            return Ok((result, least));
+        }
+    }
+}
+
+/// Hears the wish to stop, and keeps inner steps to itself.
+struct Steps<'p>(&'p dyn Progress);
+
+impl Progress for Steps<'_> {
+    fn begin(&self, stage: &str, total: u64) {
+        Silent.begin(stage, total);
+    }
+
+    fn advance(&self, steps: u64) {
+        Silent.advance(steps);
+    }
+
+    fn end(&self) {
+        Silent.end();
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn images_shrink_in_proportion() {
+        assert_eq!(super::reduced([100, 100, 100]), [22, 22, 22]);
+        assert_eq!(super::reduced([480, 360, 1]), [126, 94, 1]);
+        assert_eq!(super::reduced([8, 8, 8]), [8, 8, 8]);
+    }
+}
