@@ -80,7 +80,7 @@ impl<'m, const D: usize> Tracer<'m, D> {
                 let order = if (crossing.t - hit.t).abs() > crossing.error + error {
                     crossing.t.total_cmp(&hit.t)
                 } else {
-                    self.exact_order(ray, &cone, hit.simplex)
+                    self.exact_order(ray, simplex, &cone, hit.simplex)
                 };
                 if order.then(simplex.cmp(&hit.simplex)) == Ordering::Greater {
                     return limit;
@@ -94,10 +94,24 @@ impl<'m, const D: usize> Tracer<'m, D> {
         best.map(|(hit, _)| hit)
     }
 
+    /// Which of two simplices comes first on a ray that hits both: `Less` if it is `a`. Of those at exactly the same
+    /// distance it is the one of the lower index, as for [`Tracer::closest_hit`].
+    pub fn order(&self, ray: &Ray<D>, a: u32, b: u32) -> Ordering {
+        let [one, two] = [a, b].map(|s| Cone::of_simplex(&ray.origin, &self.mesh.corners(s)));
+        let [t, u] = [&one, &two].map(|cone| cone.crossing(&ray.direction));
+        let order =
+            if (t.t - u.t).abs() > t.error + u.error { t.t.total_cmp(&u.t) } else { self.exact_order(ray, a, &one, b) };
+        order.then(a.cmp(&b))
+    }
+
     /// Compares the distances of two hits exactly, as fractions.
     #[cold]
-    fn exact_order(&self, ray: &Ray<D>, cone: &Cone<D>, other: u32) -> Ordering {
-        let other = Cone::of_simplex(&ray.origin, &self.mesh.corners(other));
+    fn exact_order(&self, ray: &Ray<D>, simplex: u32, cone: &Cone<D>, other: u32) -> Ordering {
+        let corners = self.mesh.corners(other);
+        if self.mesh.corners(simplex).iter().all(|corner| corners.contains(corner)) {
+            return Ordering::Equal; // one on the other, as where two boxes touch
+        }
+        let other = Cone::of_simplex(&ray.origin, &corners);
         let (a, b) = cone.exact_distance(&ray.direction);
         let (c, d) = other.exact_distance(&ray.direction);
         a.multiply(&d).add(&c.multiply(&b).negate()).sign().cmp(&0)

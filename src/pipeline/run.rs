@@ -291,6 +291,7 @@ impl Run<'_> {
         let grid = camera.grid(render.dimensions);
         let picture = Picture { tracer: scene.tracer(), grid, camera, shading: shading(plan, render, &scene.values) };
         let start = Instant::now();
+        let visibility = picture.visibility(render.visibility);
         let mut files = PictureFiles::create(plan, index, &self.stale, &grid, &scene.hash)?;
         let channels = files.channels().to_vec();
         let thick = picture.layers_within(SLAB_BYTES, &channels);
@@ -300,7 +301,7 @@ impl Run<'_> {
         let mut seen = 0;
         for first in (0..depth).step_by(thick) {
             let layers = first..depth.min(first + thick);
-            let slab = picture.slab(layers, &channels, self.progress)?;
+            let slab = picture.slab_of(&visibility, layers, &channels, self.progress)?;
             seen += files.add_slab(first, &slab)?;
         }
         self.progress.end();
