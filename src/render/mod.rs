@@ -67,6 +67,9 @@ impl<const D: usize> Picture<'_, D> {
         channels: &[Channel],
         progress: &dyn Progress,
     ) -> Result<Vec<Array>, Error> {
+        if !matches!(self.shading, Shading::None | Shading::Flat(_) | Shading::Smooth(_)) {
+            self.tracer.prepare();
+        }
         let visible = visibility.first_hits(layers.clone(), progress)?;
         let fragments = shading::shade(self, layers.clone(), &visible, progress)?;
         Ok(channels.iter().map(|c| c.array(self, layers.clone(), &fragments)).collect())

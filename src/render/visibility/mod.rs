@@ -56,6 +56,9 @@ impl<'s, const D: usize> Visibility<'s, D> {
     pub fn new(tracer: &'s Tracer<'s, D>, camera: &Camera<D>, grid: &Grid, method: Method) -> Self {
         let raster = (method != Method::RayCast).then(|| Raster::new(tracer.mesh(), camera, grid));
         let raster = raster.filter(|r| method == Method::Rasterize || r.is_cheaper::<D>(grid));
+        if raster.is_none() {
+            tracer.prepare();
+        }
         Self { tracer, camera: camera.clone(), grid: *grid, raster }
     }
 
