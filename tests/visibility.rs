@@ -233,14 +233,14 @@ fn every_pipelines_pictures() {
 
 #[test]
 fn the_cheaper_way_is_chosen() {
-    let pick = |mesh: &Mesh<4>, dimensions: [usize; 3]| {
-        let camera = Camera::new(&View { eye: vector([0.0, 0.0, 0.0, 3.0]), ..View::default() }).unwrap();
+    let pick = |mesh: &Mesh<4>, distance: f64, dimensions: [usize; 3]| {
+        let camera = Camera::new(&View { eye: vector([0.0, 0.0, 0.0, distance]), ..View::default() }).unwrap();
         let tracer = Tracer::new(mesh);
         Visibility::new(&tracer, &camera, &camera.grid(dimensions), Method::Auto).method()
     };
     let sphere = mesh(&object::<4>(json!({"hypersphere": {"radius": 1.0, "subdivisions": 6}})));
-    assert_eq!(pick(&sphere, [64, 64, 64]), Method::Rasterize);
-    // Two thousand large tetrahedra behind each other.
+    assert_eq!(pick(&sphere, 3.0, [64, 64, 64]), Method::Rasterize);
+    // Two thousand tetrahedra all around, each of which covers much.
     let soup = mesh(&Random(1).soup::<4>(2000, 2.0, false));
-    assert_eq!(pick(&soup, [16, 16, 16]), Method::RayCast);
+    assert_eq!(pick(&soup, 0.3, [16, 16, 16]), Method::RayCast);
 }

@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! cargo bench --bench visibility -- [--subdivisions 4,9,18] [--dimensions 128x128x64,128x128x128] [--threads 1,2]
+//!                                   [--view 90]
 //! ```
 //!
 //! The sphere of radius 1 is seen from a distance of 3, as in NTracer's scene (16 n^3 tetrahedra; 18 gives 93,312). Times
@@ -16,7 +17,7 @@ use ao4d::geometry::Vector64;
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation};
 use ao4d::progress::Silent;
 use ao4d::render::visibility::Method;
-use ao4d::render::{Camera, Channel, NOTHING, Picture, Shading, View};
+use ao4d::render::{Camera, Channel, NOTHING, Picture, Projection, Shading, View};
 use ao4d::scene::{ObjectSpec, build_object};
 use rustix::time::{ClockId, clock_gettime};
 
@@ -64,7 +65,9 @@ fn main() {
         for size in list("--dimensions", "128x128x64,128x128x128") {
             let d: Vec<usize> = size.split('x').map(|n| n.parse().expect("a number")).collect();
             let eye = Vector64::from([0.0, 0.0, 0.0, 3.0]);
-            let camera = Camera::new(&View { eye, ..View::default() }).expect("a camera");
+            let field_of_view = list("--view", "90")[0].parse().expect("degrees");
+            let projection = Projection::Perspective { field_of_view };
+            let camera = Camera::new(&View { eye, projection, ..View::default() }).expect("a camera");
             let grid = camera.grid([d[0], d[1], d[2]]);
             for threads in list("--threads", "1,2") {
                 let threads: usize = threads.parse().expect("a number");
@@ -80,7 +83,7 @@ fn main() {
                     let tracer = Tracer::new(&mesh);
                     for (way, method) in [("ray_cast", Method::RayCast), ("rasterize", Method::Rasterize)] {
                         let (_, prepare, _) = time(|| match method {
-                            Method::RayCast => drop(Tracer::new(&mesh).bvh().nodes.len()),
+                            Method::RayCast => Tracer::new(&mesh).prepare(),
                             _ => drop(ao4d::render::Visibility::new(&tracer, &camera, &grid, method)),
                         });
                         let visibility = ao4d::render::Visibility::new(&tracer, &camera, &grid, method);

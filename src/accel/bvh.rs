@@ -196,7 +196,8 @@ mod tests {
         // More boxes than one thread bins at a time, many of them in one place.
         let boxes: Vec<Aabb<D>> = (0..100_000u32)
             .map(|i| {
-                let corner = Vector::from_fn(|r, _| (i.wrapping_mul(2_654_435_761 + 97 * r as u32) >> (8 + i % 3)) as f32);
+                let corner =
+                    Vector::<D>::from_fn(|r, _| (i.wrapping_mul(2_654_435_761 + 97 * r as u32) >> (8 + i % 3)) as f32);
                 Aabb { min: corner, max: corner.add_scalar((i % 1000) as f32) }
             })
             .collect();

@@ -52,6 +52,19 @@ impl<'m, const D: usize> Tracer<'m, D> {
         }
     }
 
+    /// [`Tracer::prepare`], and lays the hierarchy out for SIMD too.
+    pub fn prepare_wide(&self) {
+        self.prepare();
+        if self.wide.get().is_none() {
+            let _ = self.wide.set(WideBvh::new(self.bvh(), self.mesh, true));
+        }
+    }
+
+    /// Whether the hierarchy is there already.
+    pub fn is_prepared(&self) -> bool {
+        self.bvh.get().is_some()
+    }
+
     /// The hierarchy.
     #[inline]
     pub fn bvh(&self) -> &Bvh<D> {
@@ -72,7 +85,7 @@ impl<'m, const D: usize> Tracer<'m, D> {
 
     /// The same hierarchy laid out for SIMD; made when first asked for.
     pub fn wide(&self) -> &WideBvh<D> {
-        self.wide.get_or_init(|| WideBvh::new(self.bvh(), self.mesh))
+        self.wide.get_or_init(|| WideBvh::new(self.bvh(), self.mesh, false))
     }
 
     /// Whether the ray hits this simplex at a distance in `(0, limit]`.

@@ -55,7 +55,7 @@ impl<'s, const D: usize> Visibility<'s, D> {
     /// Chooses the way, and prepares it.
     pub fn new(tracer: &'s Tracer<'s, D>, camera: &Camera<D>, grid: &Grid, method: Method) -> Self {
         let raster = (method != Method::RayCast).then(|| Raster::new(tracer.mesh(), camera, grid));
-        let raster = raster.filter(|r| method == Method::Rasterize || r.is_cheaper::<D>(grid));
+        let raster = raster.filter(|r| method == Method::Rasterize || r.is_cheaper::<D>(grid, tracer.is_prepared()));
         if raster.is_none() {
             tracer.prepare();
         }
@@ -65,6 +65,12 @@ impl<'s, const D: usize> Visibility<'s, D> {
     /// The way that was chosen; never [`Method::Auto`].
     pub fn method(&self) -> Method {
         if self.raster.is_some() { Method::Rasterize } else { Method::RayCast }
+    }
+
+    /// What it costs to look at every voxel, in rays, about: to weigh against what is saved by knowing what is seen.
+    pub fn cost(&self) -> u64 {
+        let voxels = self.grid.len() as u64;
+        if self.raster.is_some() { voxels / 16 } else { voxels }
     }
 
     /// The simplex that the ray through each voxel of some layers hits first, x fastest, or [`NOTHING`].

@@ -128,9 +128,9 @@ impl Raster {
         Self { boxes }
     }
 
-    /// Whether it promises to be faster than a ray for each voxel. The costs are nanoseconds on one machine; what counts
-    /// is their ratio.
-    pub fn is_cheaper<const D: usize>(&self, grid: &Grid) -> bool {
+    /// Whether it promises to be faster than a ray for each voxel, and a hierarchy if there is none yet. The costs are
+    /// nanoseconds on one machine; what counts is their ratio.
+    pub fn is_cheaper<const D: usize>(&self, grid: &Grid, prepared: bool) -> bool {
         let filled = if D == 3 { 1.0 / 2.0 } else { 1.0 / 6.0 };
         let convert = |b: &Box3| {
             let rows = b.count(1) * b.count(2);
@@ -138,8 +138,8 @@ impl Raster {
         };
         let raster: f64 = self.boxes.iter().map(convert).sum();
         let depth = (self.boxes.len() as f64).max(2.0).log2();
-        let cast = grid.len() as f64 * (50.0 + 60.0 * depth) + 400.0 * self.boxes.len() as f64;
-        raster < cast
+        let build = if prepared { 0.0 } else { 400.0 * self.boxes.len() as f64 };
+        raster < grid.len() as f64 * (50.0 + 60.0 * depth) + build
     }
 
     /// The simplex that each voxel of some layers sees first.
