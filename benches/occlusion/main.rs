@@ -121,6 +121,7 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
     let mesh = builder.finish();
     let start = Instant::now();
     let tracer = Tracer::new(&mesh);
+    tracer.prepare();
     let build = start.elapsed().as_secs_f64();
     let wide = tracer.wide();
     let collapse = start.elapsed().as_secs_f64() - build;

@@ -2,18 +2,13 @@
 //!
 //! The cost of a split is (measure of the left box x its count + the same on the right), where the measure of a box in
 //! R^D is the sum over the axes of the product of its other edges ([`Aabb::half_surface`]). Nodes lie in one array;
-//! the two children of a node are neighbours, so one index names both.
+//! the two children of a node are neighbours, so one index names both. How it is built is in [`super::build`].
 
+use super::build;
 use crate::geometry::{Aabb, Ray};
 
-/// Bins a split chooses between, per axis.
-const BINS: usize = 16;
-/// Leaves hold at most this many boxes, unless they all have the same centre.
-const LEAF: usize = 4;
-/// Below this depth splits halve the count, which bounds the depth by this plus 32.
-const SAH_DEPTH: usize = 48;
 /// Deep enough for any traversal.
-const STACK: usize = SAH_DEPTH + 33;
+const STACK: usize = build::DEPTH + 1;
 
 /// A node: a box, and either a range of boxes (a leaf) or a pair of children.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,56 +30,15 @@ pub struct Bvh<const D: usize> {
     pub order: Vec<u32>,
 }
 
-/// Where a split would go.
-struct Split {
-    axis: usize,
-    bin: usize,
-    cost: f32,
-}
-
 impl<const D: usize> Bvh<D> {
-    /// Builds it over the items whose boxes these are.
-    pub fn build(items: Vec<u32>, bounds: &[Aabb<D>]) -> Self {
-        let mut bvh = Self { nodes: Vec::new(), order: items };
-        if bvh.order.is_empty() {
-            return bvh;
-        }
-        bvh.nodes.reserve(bvh.order.len());
-        let all = bvh.order.iter().fold(Aabb::empty(), |b, &i| b.union(&bounds[i as usize]));
-        let count = bvh.order.len();
-        bvh.nodes.push(Node { bounds: all, first: 0, count: count as u32 });
-        bvh.split(0, 0, bounds);
-        bvh.nodes.shrink_to_fit();
+    /// Builds it over the items whose boxes these are; if `parallel` on all threads, which changes nothing else.
+    pub fn build(items: &[u32], bounds: &[Aabb<D>], parallel: bool) -> Self {
+        let mut items: Vec<build::Item<D>> =
+            items.iter().map(|&index| build::Item { bounds: bounds[index as usize], index }).collect();
+        let nodes = build::tree(&mut items, parallel);
+        let bvh = Self { nodes, order: items.iter().map(|item| item.index).collect() };
         debug_assert_eq!(bvh.validate(bounds), Ok(()));
         bvh
-    }
-
-    fn split(&mut self, node: usize, depth: usize, bounds: &[Aabb<D>]) {
-        let (first, count) = (self.nodes[node].first as usize, self.nodes[node].count as usize);
-        if count <= 1 {
-            return;
-        }
-        let items = &mut self.order[first..first + count];
-        let centres = items.iter().fold(Aabb::empty(), |b, &i| b.with(&bounds[i as usize].doubled_centre()));
-        let leaf_cost = self.nodes[node].bounds.half_surface() * count as f32;
-        let middle = match best_split(items, bounds, &centres).filter(|_| depth < SAH_DEPTH) {
-            Some(split) if count > LEAF || split.cost < leaf_cost => {
-                let bin = |i: u32| bin_of(&bounds[i as usize], &centres, split.axis);
-                partition(items, |&i| bin(i) <= split.bin)
-            }
-            Some(_) => return,
-            None if count <= LEAF => return,
-            // All centres coincide, or the tree is too deep: halve by index.
-            None => count / 2,
-        };
-        let boxes = [&items[..middle], &items[middle..]]
-            .map(|half| half.iter().fold(Aabb::empty(), |b, &i| b.union(&bounds[i as usize])));
-        let left = self.nodes.len();
-        self.nodes.push(Node { bounds: boxes[0], first: first as u32, count: middle as u32 });
-        self.nodes.push(Node { bounds: boxes[1], first: (first + middle) as u32, count: (count - middle) as u32 });
-        (self.nodes[node].first, self.nodes[node].count) = (left as u32, 0);
-        self.split(left, depth + 1, bounds);
-        self.split(left + 1, depth + 1, bounds);
     }
 
     /// Calls `hit` for items whose boxes the ray may meet within `[0, limit]` until one returns true.
@@ -182,56 +136,6 @@ impl<const D: usize> Bvh<D> {
     }
 }
 
-#[inline]
-fn bin_of<const D: usize>(item: &Aabb<D>, centres: &Aabb<D>, axis: usize) -> usize {
-    let extent = centres.max[axis] - centres.min[axis];
-    let place = (item.doubled_centre()[axis] - centres.min[axis]) / extent;
-    ((place * BINS as f32) as usize).min(BINS - 1)
-}
-
-/// The cheapest of all splits between bins, over all axes; none if all centres coincide.
-fn best_split<const D: usize>(items: &[u32], bounds: &[Aabb<D>], centres: &Aabb<D>) -> Option<Split> {
-    let mut best: Option<Split> = None;
-    for axis in 0..D {
-        let extent = centres.max[axis] - centres.min[axis];
-        if !(extent > 0.0 && extent.is_finite()) {
-            continue;
-        }
-        let mut bins = [(Aabb::<D>::empty(), 0usize); BINS];
-        for &i in items {
-            let bin = &mut bins[bin_of(&bounds[i as usize], centres, axis)];
-            bin.0 = bin.0.union(&bounds[i as usize]);
-            bin.1 += 1;
-        }
-        let cost = |side: &(Aabb<D>, usize)| if side.1 == 0 { 0.0 } else { side.0.half_surface() * side.1 as f32 };
-        let join = |a: (Aabb<D>, usize), b: &(Aabb<D>, usize)| (a.0.union(&b.0), a.1 + b.1);
-        let mut right_costs = [0.0; BINS];
-        let mut right = (Aabb::empty(), 0);
-        for bin in (1..BINS).rev() {
-            right = join(right, &bins[bin]);
-            right_costs[bin] = cost(&right);
-        }
-        let mut left = (Aabb::empty(), 0);
-        for bin in 0..BINS - 1 {
-            left = join(left, &bins[bin]);
-            let cost = cost(&left) + right_costs[bin + 1];
-            if left.1 > 0 && left.1 < items.len() && best.as_ref().is_none_or(|b| cost < b.cost) {
-                best = Some(Split { axis, bin, cost });
-            }
-        }
-    }
-    best
-}
-
-/// Brings what satisfies the condition to the front, in order, and returns how many do.
-fn partition(items: &mut [u32], condition: impl Fn(&u32) -> bool) -> usize {
-    let (mut front, back): (Vec<u32>, Vec<u32>) = items.iter().partition(|i| condition(i));
-    let middle = front.len();
-    front.extend(back);
-    items.copy_from_slice(&front);
-    middle
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,7 +155,8 @@ mod tests {
                     Aabb { min: corner, max: corner + size }
                 })
                 .collect();
-            let bvh = Bvh::build((0..count as u32).collect(), &boxes);
+            let items: Vec<u32> = (0..count as u32).collect();
+            let bvh = Bvh::build(&items, &boxes, false);
             assert_eq!(bvh.validate(&boxes), Ok(()));
             for _ in 0..50 {
                 let ray = Ray::new(Vector::from_fn(|_, _| 2.0 * random()), Vector::from_fn(|_, _| random()));
@@ -283,7 +188,33 @@ mod tests {
     fn coincident_boxes_make_a_shallow_tree() {
         let one = Aabb::<4>::of(&[Vector::from_element(1.0)]);
         let boxes = vec![one; 5000];
-        let bvh = Bvh::build((0..5000).collect(), &boxes);
+        let bvh = Bvh::build(&(0..5000).collect::<Vec<u32>>(), &boxes, true);
         assert_eq!(bvh.validate(&boxes), Ok(()));
+    }
+
+    fn threads<const D: usize>() {
+        // More boxes than one thread bins at a time, many of them in one place.
+        let boxes: Vec<Aabb<D>> = (0..100_000u32)
+            .map(|i| {
+                let corner =
+                    Vector::<D>::from_fn(|r, _| (i.wrapping_mul(2_654_435_761 + 97 * r as u32) >> (8 + i % 3)) as f32);
+                Aabb { min: corner, max: corner.add_scalar((i % 1000) as f32) }
+            })
+            .collect();
+        let items: Vec<u32> = (0..100_000).filter(|i| i % 10 != 3).collect();
+        let one = Bvh::build(&items, &boxes, false);
+        assert_eq!(one.validate(&boxes), Ok(()));
+        assert!(one.nodes.len() > 20_000);
+        for threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let many = pool.install(|| Bvh::build(&items, &boxes, true));
+            assert!(many == one, "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn any_number_of_threads_builds_the_same() {
+        threads::<3>();
+        threads::<4>();
     }
 }

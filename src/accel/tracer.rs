@@ -6,15 +6,17 @@
 use std::cmp::Ordering;
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use super::{Bvh, WideBvh};
 use crate::geometry::{Aabb, Cone, Ray};
 use crate::mesh::Mesh;
 
-/// A mesh with the hierarchy over its simplices of positive measure.
+/// A mesh with the hierarchy over its simplices of positive measure, which is made when it is first asked for.
 #[derive(Clone, Debug)]
 pub struct Tracer<'m, const D: usize> {
     mesh: &'m Mesh<D>,
-    bvh: Bvh<D>,
+    bvh: OnceLock<Bvh<D>>,
     wide: OnceLock<WideBvh<D>>,
 }
 
@@ -30,12 +32,9 @@ pub struct Hit<const D: usize> {
 }
 
 impl<'m, const D: usize> Tracer<'m, D> {
-    /// Builds the hierarchy.
+    /// Builds nothing yet.
     pub fn new(mesh: &'m Mesh<D>) -> Self {
-        let bounds: Vec<Aabb<D>> = (0..mesh.simplices.len() as u32).map(|s| Aabb::of(mesh.corners(s).iter())).collect();
-        let mut solid: Vec<u32> = (0..mesh.simplices.len() as u32).collect();
-        solid.retain(|s| mesh.degenerate.binary_search(s).is_err());
-        Self { mesh, bvh: Bvh::build(solid, &bounds), wide: OnceLock::new() }
+        Self { mesh, bvh: OnceLock::new(), wide: OnceLock::new() }
     }
 
     /// The mesh it was made of.
@@ -43,14 +42,50 @@ impl<'m, const D: usize> Tracer<'m, D> {
         self.mesh
     }
 
+    /// Builds the hierarchy on all threads, unless it is there. Who is going to trace from many threads calls this
+    /// before; else the first of them builds it alone while the others wait.
+    pub fn prepare(&self) {
+        // Not within `get_or_init`: a thread that waits for its half of the work takes up other work meanwhile, and would
+        // wait for itself if that asked for the hierarchy.
+        if self.bvh.get().is_none() {
+            let _ = self.bvh.set(self.build(true));
+        }
+    }
+
+    /// [`Tracer::prepare`], and lays the hierarchy out for SIMD too.
+    pub fn prepare_wide(&self) {
+        self.prepare();
+        if self.wide.get().is_none() {
+            let _ = self.wide.set(WideBvh::new(self.bvh(), self.mesh, true));
+        }
+    }
+
+    /// Whether the hierarchy is there already.
+    pub fn is_prepared(&self) -> bool {
+        self.bvh.get().is_some()
+    }
+
     /// The hierarchy.
+    #[inline]
     pub fn bvh(&self) -> &Bvh<D> {
-        &self.bvh
+        self.bvh.get_or_init(|| self.build(false))
+    }
+
+    fn build(&self, parallel: bool) -> Bvh<D> {
+        let all = 0..self.mesh.simplices.len() as u32;
+        let of = |s: u32| Aabb::of(self.mesh.corners(s).iter());
+        let bounds: Vec<Aabb<D>> =
+            if parallel { all.clone().into_par_iter().map(of).collect() } else { all.clone().map(of).collect() };
+        let mut solid: Vec<u32> = all.collect();
+        if !self.mesh.degenerate.is_empty() {
+            solid.retain(|s| self.mesh.degenerate.binary_search(s).is_err());
+        }
+        Bvh::build(&solid, &bounds, parallel)
     }
 
     /// The same hierarchy laid out for SIMD; made when first asked for.
     pub fn wide(&self) -> &WideBvh<D> {
-        self.wide.get_or_init(|| WideBvh::new(&self.bvh, self.mesh))
+        self.wide.get_or_init(|| WideBvh::new(self.bvh(), self.mesh, false))
     }
 
     /// Whether the ray hits this simplex at a distance in `(0, limit]`.
@@ -63,14 +98,14 @@ impl<'m, const D: usize> Tracer<'m, D> {
     /// Whether the ray hits any simplex but `ignored` at a distance in `(0, limit]`.
     #[inline]
     pub fn occluded(&self, ray: &Ray<D>, limit: f32, ignored: Option<u32>) -> bool {
-        self.bvh.any(ray, limit, |simplex| ignored != Some(simplex) && self.hits(simplex, ray, limit))
+        self.bvh().any(ray, limit, |simplex| ignored != Some(simplex) && self.hits(simplex, ray, limit))
     }
 
     /// The simplex that the ray hits first, if any.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray<D>) -> Option<Hit<D>> {
         let mut best: Option<(Hit<D>, f64)> = None;
-        self.bvh.nearest(ray, f32::INFINITY, |simplex, limit| {
+        self.bvh().nearest(ray, f32::INFINITY, |simplex, limit| {
             let cone = Cone::of_simplex(&ray.origin, &self.mesh.corners(simplex));
             if !cone.contains(&ray.direction) {
                 return limit;
@@ -80,7 +115,7 @@ impl<'m, const D: usize> Tracer<'m, D> {
                 let order = if (crossing.t - hit.t).abs() > crossing.error + error {
                     crossing.t.total_cmp(&hit.t)
                 } else {
-                    self.exact_order(ray, &cone, hit.simplex)
+                    self.exact_order(ray, simplex, &cone, hit.simplex)
                 };
                 if order.then(simplex.cmp(&hit.simplex)) == Ordering::Greater {
                     return limit;
@@ -94,10 +129,24 @@ impl<'m, const D: usize> Tracer<'m, D> {
         best.map(|(hit, _)| hit)
     }
 
+    /// Which of two simplices comes first on a ray that hits both: `Less` if it is `a`. Of those at exactly the same
+    /// distance it is the one of the lower index, as for [`Tracer::closest_hit`].
+    pub fn order(&self, ray: &Ray<D>, a: u32, b: u32) -> Ordering {
+        let [one, two] = [a, b].map(|s| Cone::of_simplex(&ray.origin, &self.mesh.corners(s)));
+        let [t, u] = [&one, &two].map(|cone| cone.crossing(&ray.direction));
+        let order =
+            if (t.t - u.t).abs() > t.error + u.error { t.t.total_cmp(&u.t) } else { self.exact_order(ray, a, &one, b) };
+        order.then(a.cmp(&b))
+    }
+
     /// Compares the distances of two hits exactly, as fractions.
     #[cold]
-    fn exact_order(&self, ray: &Ray<D>, cone: &Cone<D>, other: u32) -> Ordering {
-        let other = Cone::of_simplex(&ray.origin, &self.mesh.corners(other));
+    fn exact_order(&self, ray: &Ray<D>, simplex: u32, cone: &Cone<D>, other: u32) -> Ordering {
+        let corners = self.mesh.corners(other);
+        if self.mesh.corners(simplex).iter().all(|corner| corners.contains(corner)) {
+            return Ordering::Equal; // one on the other, as where two boxes touch
+        }
+        let other = Cone::of_simplex(&ray.origin, &corners);
         let (a, b) = cone.exact_distance(&ray.direction);
         let (c, d) = other.exact_distance(&ray.direction);
         a.multiply(&d).add(&c.multiply(&b).negate()).sign().cmp(&0)

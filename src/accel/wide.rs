@@ -10,6 +10,8 @@
 //! grown by [`GROWTH`], more than all rounding of the box test together: a ray that meets a simplex is never told to
 //! miss a box around it, however the test is evaluated.
 
+use rayon::prelude::*;
+
 use super::Bvh;
 use crate::geometry::{Aabb, Vector, Vector64, widen};
 use crate::mesh::Mesh;
@@ -138,8 +140,8 @@ impl Plan {
 }
 
 impl<const D: usize> WideBvh<D> {
-    /// Makes it from the binary tree over simplices of the mesh.
-    pub fn new(bvh: &Bvh<D>, mesh: &Mesh<D>) -> Self {
+    /// Makes it from the binary tree over simplices of the mesh; if `parallel` on all threads, which changes nothing else.
+    pub fn new(bvh: &Bvh<D>, mesh: &Mesh<D>, parallel: bool) -> Self {
         let mut wide = Self {
             nodes: Vec::new(),
             leaves: Vec::new(),
@@ -153,15 +155,15 @@ impl<const D: usize> WideBvh<D> {
         let plan = Plan::new(bvh);
         wide.nodes.push(WideNode::empty());
         let mut open = vec![(0usize, 0usize, 1usize)];
+        let mut leaves = Vec::new();
         while let Some((source, target, depth)) = open.pop() {
             wide.depth = wide.depth.max(depth);
             let children = Self::children(bvh, &plan, source);
             for (lane, &child) in children.iter().enumerate() {
                 let index = if plan.is_leaf[child] {
-                    let (first, end) = plan.ranges[child];
-                    wide.leaves.push(Leaf::new(&bvh.order[first as usize..end as usize], mesh, &wide.scale));
+                    leaves.push(plan.ranges[child]);
                     wide.nodes[target].leaves |= 1 << lane;
-                    (wide.leaves.len() - 1) as u32
+                    (leaves.len() - 1) as u32
                 } else {
                     open.push((child, wide.nodes.len(), depth + 1));
                     wide.nodes.push(WideNode::empty());
@@ -171,7 +173,12 @@ impl<const D: usize> WideBvh<D> {
             }
         }
         wide.nodes.shrink_to_fit();
-        wide.leaves.shrink_to_fit();
+        let leaf = |(first, end): (u32, u32)| Leaf::new(&bvh.order[first as usize..end as usize], mesh, &wide.scale);
+        wide.leaves = if parallel {
+            leaves.into_par_iter().with_min_len(256).map(leaf).collect()
+        } else {
+            leaves.into_iter().map(leaf).collect()
+        };
         wide
     }
 

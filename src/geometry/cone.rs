@@ -86,6 +86,19 @@ impl<const D: usize> Cone<D> {
         self.orientation
     }
 
+    /// The vector N with `det[w in place of column i] = N . w`, rounded, and a bound on the error of that product for
+    /// |w|_1 = 1. Times [`Cone::orientation`] it points inwards.
+    #[inline]
+    pub fn facet(&self, i: usize) -> (Vector64<D>, f64) {
+        (self.normals[i], self.bounds[i])
+    }
+
+    /// The determinant of the columns, rounded, and a bound on that error.
+    #[inline]
+    pub fn determinant(&self) -> (f64, f64) {
+        (self.determinant, self.determinant_bound)
+    }
+
     #[inline]
     fn facet_sign(&self, i: usize, direction: &Vector<D>, direction64: &Vector64<D>, norm1: f64) -> i32 {
         let value = self.normals[i].dot(direction64);

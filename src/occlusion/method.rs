@@ -8,11 +8,8 @@
 //! - the algorithm as it was published ([`Method::AsPublished`]), whose errors are those of its rays, not of its slips.
 
 use super::exact::{self, Budget};
-use super::vertices::everywhere;
-use super::{
-    Error, Estimate, Estimates, Level, Settings, Site, Slips, Stream, Target, as_published, estimate_at,
-    estimate_vertices,
-};
+use super::vertices::{estimate_wanted, everywhere};
+use super::{Error, Estimate, Estimates, Level, Settings, Site, Slips, Stream, Target, as_published, estimate_at};
 use crate::accel::Tracer;
 use crate::geometry::Vector;
 use crate::mesh::Incidence;
@@ -46,25 +43,45 @@ impl Method {
     /// # Errors
     /// [`Error::Cancelled`] if `progress` says so; [`Error::OverBudget`] if the closed form is too dear.
     pub fn at_vertices<const D: usize>(&self, tracer: &Tracer<D>, progress: &dyn Progress) -> Result<Estimates, Error> {
+        self.at_wanted(tracer, None, progress)
+    }
+
+    /// [`Method::at_vertices`], but only at those that are wanted, if it is said which, one `bool` a vertex. There the
+    /// values are the same bits; elsewhere they are 1, with errors of NaN where rays are used.
+    ///
+    /// # Errors
+    /// Those of [`Method::at_vertices`].
+    pub fn at_wanted<const D: usize>(
+        &self,
+        tracer: &Tracer<D>,
+        wanted: Option<&[bool]>,
+        progress: &dyn Progress,
+    ) -> Result<Estimates, Error> {
+        tracer.prepare();
         match *self {
             Self::Sampled(settings, target) => {
-                Ok(estimate_vertices(Level::best(), tracer, &settings, target, progress)?)
+                Ok(estimate_wanted(Level::best(), tracer, &settings, target, wanted, progress)?)
             }
             Self::Adaptive(settings, target) => {
                 let incidence = Incidence::new(tracer.mesh());
                 let estimate =
                     |stream: &mut Stream<D>, vertex| adaptive(stream, tracer, &incidence, &settings, target, vertex);
-                Ok(everywhere(tracer, BATCH, progress, Stream::default, estimate)?)
+                Ok(everywhere(tracer, BATCH, wanted, progress, Stream::default, estimate)?)
             }
             Self::Exact(budget) => {
-                let values = exact::at_vertices(tracer, budget, progress)?;
+                let values = exact::at_wanted(tracer, budget, wanted, progress)?;
                 let errors = vec![0.0; values.len()];
                 Ok(Estimates { values: values.into_iter().map(|v| v as f32).collect(), errors, rays: 0 })
             }
             Self::AsPublished(settings, slips) => {
-                let values = as_published(tracer, slips, &settings, progress)?;
-                let errors = values.iter().map(|&value| Estimate::independent(value, settings.samples).error).collect();
-                let rays = values.len() as u64 * u64::from(settings.samples);
+                let values = as_published::at_wanted(tracer, slips, &settings, wanted, progress)?;
+                let error = |(vertex, &value): (usize, &f32)| match wanted {
+                    Some(wanted) if !wanted[vertex] => f32::NAN,
+                    _ => Estimate::independent(value, settings.samples).error,
+                };
+                let errors = values.iter().enumerate().map(error).collect();
+                let asked = wanted.map_or(values.len(), |wanted| wanted.iter().filter(|&&w| w).count());
+                let rays = asked as u64 * u64::from(settings.samples);
                 Ok(Estimates { values, errors, rays })
             }
         }

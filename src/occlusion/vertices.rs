@@ -16,17 +16,21 @@ const BATCH_RAYS: usize = 1 << 13;
 pub struct Estimates {
     /// Ambient occlusion.
     pub values: Vec<f32>,
-    /// The standard error of each, 0 where it is known.
+    /// The standard error of each, 0 where it is known, NaN where nobody asked for it.
     pub errors: Vec<f32>,
     /// Rays asked in all.
     pub rays: u64,
 }
 
 impl Estimates {
-    /// The root mean square of the errors.
+    /// The root mean square of the errors, of those values that were asked for.
     pub fn error(&self) -> f64 {
-        let squares: f64 = self.errors.iter().map(|&e| f64::from(e).powi(2)).sum();
-        (squares / self.errors.len().max(1) as f64).sqrt()
+        let (mut squares, mut count) = (0.0, 0usize);
+        for error in self.errors.iter().filter(|e| !e.is_nan()) {
+            squares += f64::from(*error).powi(2);
+            count += 1;
+        }
+        (squares / count.max(1) as f64).sqrt()
     }
 }
 
@@ -101,23 +105,41 @@ pub fn estimate_vertices<const D: usize>(
     target: Option<Target>,
     progress: &dyn Progress,
 ) -> Result<Estimates, Cancelled> {
+    estimate_wanted(level, tracer, settings, target, None, progress)
+}
+
+/// [`estimate_vertices`] at those that are wanted, or at all.
+pub(super) fn estimate_wanted<const D: usize>(
+    level: Level,
+    tracer: &Tracer<D>,
+    settings: &Settings,
+    target: Option<Target>,
+    wanted: Option<&[bool]>,
+    progress: &dyn Progress,
+) -> Result<Estimates, Cancelled> {
     let incidence = Incidence::new(tracer.mesh());
     let usual = target.map_or(settings.samples, |_| Target::FEWEST.min(settings.samples));
     let batch = (BATCH_RAYS / usual.max(1) as usize).clamp(1, 64);
     let estimate =
         |stream: &mut Stream<D>, vertex| stream.estimate_at_vertex(tracer, &incidence, settings, target, vertex);
-    everywhere(tracer, batch, progress, || Stream::new(level), estimate)
+    everywhere(tracer, batch, wanted, progress, || Stream::new(level), estimate)
 }
 
-/// Asks for every vertex, on all cores, a batch at a time.
+/// Asks for every vertex that is wanted, or for all, on all cores, a batch at a time.
 pub(super) fn everywhere<const D: usize, S>(
     tracer: &Tracer<D>,
     batch: usize,
+    wanted: Option<&[bool]>,
     progress: &dyn Progress,
     memory: impl Fn() -> S + Sync + Send,
     estimate: impl Fn(&mut S, u32) -> Estimate + Sync + Send,
 ) -> Result<Estimates, Cancelled> {
-    let order = spatial_order(tracer);
+    tracer.prepare_wide();
+    let mut order = spatial_order(tracer);
+    let count = order.len();
+    if let Some(wanted) = wanted {
+        order.retain(|&vertex| wanted[vertex as usize]);
+    }
     let batches = order.par_chunks(batch).with_min_len(8).map_init(memory, |memory, vertices| {
         if progress.cancelled() {
             return Err(Cancelled);
@@ -127,8 +149,7 @@ pub(super) fn everywhere<const D: usize, S>(
         Ok(found)
     });
     let found: Vec<Vec<Estimate>> = batches.collect::<Result<_, _>>()?;
-    let count = order.len();
-    let mut estimates = Estimates { values: vec![1.0; count], errors: vec![0.0; count], rays: 0 };
+    let mut estimates = Estimates { values: vec![1.0; count], errors: vec![f32::NAN; count], rays: 0 };
     for (&vertex, estimate) in order.iter().zip(found.into_iter().flatten()) {
         estimates.values[vertex as usize] = estimate.value;
         estimates.errors[vertex as usize] = estimate.error;

@@ -35,7 +35,7 @@ mod yaml;
 
 use std::path::{Path, PathBuf};
 
-pub use build::AnyMesh;
+pub use build::{AnyMesh, camera};
 pub use cut::{Axis, Cut, Plane};
 pub use document::Document;
 pub use error::{Error, Invalid, Place, Refusal};

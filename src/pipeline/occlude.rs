@@ -28,6 +28,14 @@ pub(super) fn method(computation: &Computation) -> Method {
     }
 }
 
+/// The most rays that a vertex takes; the closed form counts as a few thousand, which is what it takes as long as.
+pub(super) fn most_rays(computation: &Computation) -> u64 {
+    match computation.samples {
+        Samples::Fixed(n) | Samples::Target { max_samples: n, .. } => n,
+        Samples::Exact => 1 << 12,
+    }
+}
+
 /// Where the standard errors of an occlusion's values are kept: in `NAME.error.f32` beside `NAME.f32`. None if there is no
 /// file, or no error.
 pub(super) fn errors_file(occlusion: &OcclusionPlan) -> Option<PathBuf> {

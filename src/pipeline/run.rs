@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 use super::build::{AnyMesh, camera};
 use super::cache::{Cache, Keys};
 use super::files::{self, PictureFiles};
-use super::occlude::{errors_file, kept, method};
-use super::plan::{OcclusionSource, Plan, RenderPlan, StageRef, grouped};
+use super::occlude::{errors_file, kept, method, most_rays};
+use super::plan::{Computation, OcclusionSource, Plan, RenderPlan, StageRef, grouped};
 use super::prepare::{Loaded, Prepared, sidecar_path};
 use super::report::{FileReport, Report};
 use super::spec;
@@ -24,7 +24,7 @@ use crate::export;
 use crate::mesh::Mesh;
 use crate::occlusion::{self, Cancelled, Estimates};
 use crate::progress::Progress;
-use crate::render::{CameraError, Picture, Shading};
+use crate::render::{CameraError, NOTHING, Picture, Shading, Visibility};
 
 /// A run that didn't succeed.
 #[derive(Debug, thiserror::Error)]
@@ -263,8 +263,10 @@ impl Run<'_> {
                     Some(found) => found,
                     None => {
                         let start = Instant::now();
-                        self.progress.begin(&format!("occlusion {}", occlusion.id), count as u64);
-                        let found = method(computation).at_vertices(scene.tracer(), self.progress);
+                        let wanted = self.wanted(index, computation, scene)?;
+                        let asked = wanted.as_ref().map_or(count, |w| w.iter().filter(|&&w| w).count());
+                        self.progress.begin(&format!("occlusion {}", occlusion.id), asked as u64);
+                        let found = method(computation).at_wanted(scene.tracer(), wanted.as_deref(), self.progress);
                         self.progress.end();
                         let found = found?;
                         self.times.entry(StageRef::Occlusion(index)).or_default().1 = rate(&found, start.elapsed());
@@ -275,6 +277,51 @@ impl Run<'_> {
         };
         scene.values.insert(index, values);
         Ok(())
+    }
+
+    /// The vertices of the simplices that some voxel shows, of the pictures that have to be made; none if all values are
+    /// wanted for some file, or if looking costs more than it may save.
+    fn wanted<const D: usize>(
+        &self,
+        index: usize,
+        computation: &Computation,
+        scene: &Scene<D>,
+    ) -> Result<Option<Vec<bool>>, RunError> {
+        let plan = self.plan;
+        let meshes = plan.writes.iter().zip(&self.stale.vtu).filter(|(_, stale)| **stale);
+        let shown = meshes.into_iter().any(|(write, _)| plan.renders[write.render].occlusion == Some(index));
+        if shown || plan.occlusions[index].file.is_some() {
+            return Ok(None);
+        }
+        let renders = plan.renders.iter().enumerate().filter(|(i, render)| {
+            let values = render.occlusion == Some(index) && render.shading != spec::Shading::Voxel;
+            values && self.stale.render(plan, *i)
+        });
+        let mut left = most_rays(computation).saturating_mul(scene.mesh.vertices.len() as u64) / 4;
+        let mut wanted = vec![false; scene.mesh.vertices.len()];
+        for (_, render) in renders {
+            let camera = camera::<D>(&render.camera)?;
+            let grid = camera.grid(render.dimensions);
+            let visibility = Visibility::new(scene.tracer(), &camera, &grid, render.visibility);
+            left = left.saturating_sub(visibility.cost());
+            if left == 0 {
+                return Ok(None);
+            }
+            self.progress.begin(&format!("what {} shows", render.id), render.voxels());
+            let thick = (SLAB_BYTES / 4 / grid.layer_len()).clamp(1, grid.dimensions[2]);
+            for first in (0..grid.dimensions[2]).step_by(thick) {
+                let layers = first..grid.dimensions[2].min(first + thick);
+                let mut last = NOTHING;
+                for simplex in visibility.first_hits(layers, self.progress)? {
+                    if simplex != NOTHING && simplex != last {
+                        scene.mesh.simplices[simplex as usize].iter().for_each(|&v| wanted[v as usize] = true);
+                        last = simplex;
+                    }
+                }
+            }
+            self.progress.end();
+        }
+        Ok(Some(wanted))
     }
 
     /// Makes a picture, if some file of it isn't there yet, and its files with it.
@@ -291,6 +338,7 @@ impl Run<'_> {
         let grid = camera.grid(render.dimensions);
         let picture = Picture { tracer: scene.tracer(), grid, camera, shading: shading(plan, render, &scene.values) };
         let start = Instant::now();
+        let visibility = picture.visibility(render.visibility);
         let mut files = PictureFiles::create(plan, index, &self.stale, &grid, &scene.hash)?;
         let channels = files.channels().to_vec();
         let thick = picture.layers_within(SLAB_BYTES, &channels);
@@ -300,7 +348,7 @@ impl Run<'_> {
         let mut seen = 0;
         for first in (0..depth).step_by(thick) {
             let layers = first..depth.min(first + thick);
-            let slab = picture.slab(layers, &channels, self.progress)?;
+            let slab = picture.slab_of(&visibility, layers, &channels, self.progress)?;
             seen += files.add_slab(first, &slab)?;
         }
         self.progress.end();
@@ -367,8 +415,8 @@ fn rate(found: &Estimates, time: Duration) -> String {
     }
 }
 
-/// The working set of a slab.
-const SLAB_BYTES: usize = 256 << 20;
+/// The working set of a slab: so little that memory is used again for the next, not asked for anew.
+const SLAB_BYTES: usize = 32 << 20;
 
 fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Estimates>) -> Shading<'v> {
     let Some(o) = render.occlusion else { return Shading::None };

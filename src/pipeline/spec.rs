@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::one_or_many::OneOrMany;
 pub use crate::render::Channel;
+pub use crate::render::visibility::Method as Visibility;
 pub use crate::scene::ObjectSpec;
 
 /// A pipeline: named stages that turn a scene into images.
@@ -117,6 +118,8 @@ pub struct RenderSpec {
     pub dimensions: Vec<u64>,
     /// How the vertices' values spread over a simplex (default `smooth`).
     pub shading: Option<Shading>,
+    /// How it is found out what voxels see; changes the time, never the image (default `auto`, the faster one).
+    pub visibility: Option<Visibility>,
 }
 
 /// Where a scene is seen from. Vectors have as many numbers as the scene has dimensions.

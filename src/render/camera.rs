@@ -81,6 +81,31 @@ pub struct Camera<const D: usize> {
     back: Vector64<D>,
 }
 
+/// What the rays of an image have in common.
+#[derive(Clone, Debug)]
+pub(super) enum Rays<const D: usize> {
+    /// They start here.
+    From(Vector<D>),
+    /// They go there.
+    Along(Vector<D>),
+}
+
+/// All rays of an image: what they share, and what is affine in the voxel (i, j, k), namely their direction, not
+/// normalised, or their origin. A ray's own direction and origin are that rounded to `f32`.
+#[derive(Clone, Debug)]
+pub(super) struct Lens<const D: usize> {
+    /// What they share.
+    pub rays: Rays<D>,
+    /// The direction or origin of voxel (0, 0, 0).
+    pub start: Vector64<D>,
+    /// What is added for each step along x, y and z.
+    pub steps: [Vector64<D>; 3],
+    /// No component is larger anywhere in the image, nor any term of it.
+    pub reach: Vector64<D>,
+    /// Voxels along x.
+    pub width: usize,
+}
+
 /// `v` without its parts along the unit vectors, at length 1; none if little more than rounding is left.
 fn orthogonal<const D: usize>(v: &Vector64<D>, to: &[Vector64<D>]) -> Option<Vector64<D>> {
     let length = v.norm();
@@ -161,6 +186,33 @@ impl<const D: usize> Camera<D> {
         }))
     }
 
+    /// All rays of an image at once, as functions of the voxel.
+    pub(super) fn lens(&self, grid: &Grid) -> Lens<D> {
+        let half: [f64; 3] = std::array::from_fn(|a| match (D, a) {
+            (3, 2) => 0.0,
+            _ => 0.5 * grid.spacing[a] * (grid.dimensions[a] - 1) as f64,
+        });
+        let axes = [self.right, self.up, self.over];
+        let (rays, base) = match self.projection {
+            Projection::Perspective { .. } => (Rays::From(narrow(&self.eye)), -self.back),
+            Projection::Parallel { .. } => {
+                let ray = Ray::new(narrow(&self.eye), narrow(&-self.back));
+                (Rays::Along(ray.direction), self.eye)
+            }
+        };
+        let start = (0..3).fold(base, |sum, a| sum - axes[a] * half[a]);
+        let reach = (0..3).fold(base.map(f64::abs), |sum, a| sum + axes[a].map(f64::abs) * half[a]);
+        // What becomes zero because it is small beside the rest, or beside every f32, is told as well.
+        let small = 1e-20 * reach.sum() + 1e-37;
+        Lens {
+            rays,
+            start,
+            steps: std::array::from_fn(|a| axes[a] * grid.spacing[a] * f64::from(!(D == 3 && a == 2))),
+            reach: reach.add_scalar(small),
+            width: grid.dimensions[0],
+        }
+    }
+
     /// Where a point of the scene is seen in the image, and how far before the eye it lies along the line of sight.
     /// The image point means nothing where that distance isn't above zero.
     pub fn project(&self, point: &Vector<D>) -> ([f64; 3], f64) {
@@ -171,6 +223,16 @@ impl<const D: usize> Camera<D> {
             Projection::Parallel { .. } => 1.0,
         };
         ([&self.right, &self.up, &self.over].map(|axis| axis.dot(&offset) * scale), distance)
+    }
+
+    /// Whether rays are parallel.
+    pub(super) fn is_parallel(&self) -> bool {
+        matches!(self.projection, Projection::Parallel { .. })
+    }
+
+    /// How far a point is from the eye, by the sum over the axes.
+    pub(super) fn offset(&self, point: &Vector<D>) -> f64 {
+        (widen(point) - self.eye).iter().map(|x| x.abs()).sum()
     }
 
     /// What open surfaces face if they are to face the eye.

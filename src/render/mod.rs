@@ -15,7 +15,7 @@ pub mod visibility;
 pub use camera::{Camera, CameraError, Projection, View};
 pub use channel::Channel;
 pub use shading::{Fragment, Shading};
-pub use visibility::NOTHING;
+pub use visibility::{NOTHING, Visibility};
 
 use std::ops::Range;
 
@@ -48,7 +48,29 @@ impl<const D: usize> Picture<'_, D> {
         channels: &[Channel],
         progress: &dyn Progress,
     ) -> Result<Vec<Array>, Error> {
-        let visible = visibility::ray_cast(self.tracer, &self.camera, &self.grid, layers.clone(), progress)?;
+        self.slab_of(&self.visibility(visibility::Method::Auto), layers, channels, progress)
+    }
+
+    /// What finds what its voxels see; made once for all slabs.
+    pub fn visibility(&self, method: visibility::Method) -> Visibility<'_, D> {
+        Visibility::new(self.tracer, &self.camera, &self.grid, method)
+    }
+
+    /// [`Picture::slab`] with what [`Picture::visibility`] made.
+    ///
+    /// # Errors
+    /// Those of [`Picture::slab`].
+    pub fn slab_of(
+        &self,
+        visibility: &Visibility<D>,
+        layers: Range<usize>,
+        channels: &[Channel],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Array>, Error> {
+        if !matches!(self.shading, Shading::None | Shading::Flat(_) | Shading::Smooth(_)) {
+            self.tracer.prepare();
+        }
+        let visible = visibility.first_hits(layers.clone(), progress)?;
         let fragments = shading::shade(self, layers.clone(), &visible, progress)?;
         Ok(channels.iter().map(|c| c.array(self, layers.clone(), &fragments)).collect())
     }

@@ -54,6 +54,7 @@ pub(super) fn shade<const D: usize>(
             return Err(Error::Cancelled);
         }
         let (j, k) = (row % height, layers.start + row / height);
+        let mut cones = LastCone::new();
         for (i, (fragment, &simplex)) in fragments.iter_mut().zip(visible).enumerate() {
             if simplex != NOTHING {
                 // Occlusion at the voxel itself makes a single one take long.
@@ -61,7 +62,7 @@ pub(super) fn shade<const D: usize>(
                     return Err(Error::Cancelled);
                 }
                 let number = (i + width * (j + height * k)) as u64;
-                *fragment = shade_voxel(picture, [i, j, k], number, simplex)?;
+                *fragment = shade_voxel(picture, [i, j, k], number, simplex, &mut cones)?;
             }
         }
         progress.advance(width as u64);
@@ -70,15 +71,31 @@ pub(super) fn shade<const D: usize>(
     Ok(fragments)
 }
 
+/// The cone that was asked for last: in perspective that of the voxel before will mostly do.
+struct LastCone<const D: usize>(Option<(u32, Vector<D>, Cone<D>)>);
+
+impl<const D: usize> LastCone<D> {
+    fn new() -> Self {
+        Self(None)
+    }
+
+    fn of(&mut self, picture: &Picture<D>, simplex: u32, origin: &Vector<D>) -> &Cone<D> {
+        let kept = self.0.take().filter(|(s, o, _)| *s == simplex && o == origin);
+        let cone = || (simplex, *origin, Cone::of_simplex(origin, &picture.tracer.mesh().corners(simplex)));
+        &self.0.insert(kept.unwrap_or_else(cone)).2
+    }
+}
+
 fn shade_voxel<const D: usize>(
     picture: &Picture<D>,
     index: [usize; 3],
     number: u64,
     simplex: u32,
+    cones: &mut LastCone<D>,
 ) -> Result<Fragment, Error> {
     let mesh = picture.tracer.mesh();
     let ray = picture.camera.voxel_ray(&picture.grid, index);
-    let crossing = Cone::of_simplex(&ray.origin, &mesh.corners(simplex)).crossing(&ray.direction);
+    let crossing = cones.of(picture, simplex, &ray.origin).crossing(&ray.direction);
     let corner = |values: &[f32], i: usize| f64::from(values[mesh.simplices[simplex as usize][i] as usize]);
     let value = match &picture.shading {
         Shading::None => 1.0,

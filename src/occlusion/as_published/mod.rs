@@ -87,10 +87,25 @@ pub fn as_published<const D: usize>(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Vec<f32>, Cancelled> {
+    at_wanted(tracer, slips, settings, None, progress)
+}
+
+/// [`as_published`] at those vertices that are wanted, and 1 elsewhere.
+pub(super) fn at_wanted<const D: usize>(
+    tracer: &Tracer<D>,
+    slips: Slips,
+    settings: &Settings,
+    wanted: Option<&[bool]>,
+    progress: &dyn Progress,
+) -> Result<Vec<f32>, Cancelled> {
+    tracer.prepare();
     let published = AsPublished::new(tracer, slips);
     let value = |vertex| {
         if progress.cancelled() {
             return Err(Cancelled);
+        }
+        if wanted.is_some_and(|wanted| !wanted[vertex as usize]) {
+            return Ok(1.0);
         }
         let value = published.at_vertex(vertex, settings);
         progress.advance(1);

@@ -53,4 +53,4 @@ mod tracing;
 
 pub use hemisphere::{Budget, Hemisphere, OverBudget, visible_fraction};
 pub use tracing::{at_point, at_vertex, at_vertices};
-pub(super) use tracing::{at_point_if_simple, at_vertex_if_simple};
+pub(super) use tracing::{at_point_if_simple, at_vertex_if_simple, at_wanted};

@@ -81,11 +81,25 @@ pub fn at_vertices<const D: usize>(
     budget: Budget,
     progress: &dyn Progress,
 ) -> Result<Vec<f64>, Error> {
+    at_wanted(tracer, budget, None, progress)
+}
+
+/// [`at_vertices`] at those that are wanted, and 1 elsewhere.
+pub(in super::super) fn at_wanted<const D: usize>(
+    tracer: &Tracer<D>,
+    budget: Budget,
+    wanted: Option<&[bool]>,
+    progress: &dyn Progress,
+) -> Result<Vec<f64>, Error> {
+    tracer.prepare();
     let incidence = Incidence::new(tracer.mesh());
     let vertices = 0..tracer.mesh().vertices.len() as u32;
     let found = vertices.into_par_iter().with_max_len(1).map(|vertex| {
         if progress.cancelled() {
             return Err(Error::Cancelled);
+        }
+        if wanted.is_some_and(|wanted| !wanted[vertex as usize]) {
+            return Ok(1.0);
         }
         let value = at_vertex(tracer, &incidence, vertex, budget);
         progress.advance(1);

@@ -29,7 +29,7 @@ pub use describe::{Description, SceneCounts, grouped, size};
 
 use super::Cut;
 use super::error::Invalid;
-use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading};
+use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading, Visibility};
 
 /// The methods of occlusion that this version has.
 pub const METHODS: &[Method] = &[Method::Sobol, Method::Random, Method::Adaptive, Method::Exact, Method::AsPublished];
@@ -256,6 +256,8 @@ pub struct RenderPlan {
     pub dimensions: [usize; 3],
     /// How vertex values spread.
     pub shading: Shading,
+    /// How it is found out what voxels see.
+    pub visibility: Visibility,
     /// The arrays that its files need, in their own order, each once.
     pub arrays: Vec<Channel>,
 }

@@ -32,7 +32,9 @@ pub(super) fn render(
     }
     resolver.plan.scenes[scene].eye.get_or_insert_with(|| camera.eye.clone());
     let dimensions = dimensions(&format!("{path}.dimensions"), &spec.dimensions, dimension)?;
-    Ok(RenderPlan { id, path: path.to_owned(), scene, occlusion, camera, dimensions, shading, arrays: Vec::new() })
+    let visibility = spec.visibility.unwrap_or_default();
+    let (path, arrays) = (path.to_owned(), Vec::new());
+    Ok(RenderPlan { id, path, scene, occlusion, camera, dimensions, shading, visibility, arrays })
 }
 
 /// What a render shows, and what darkens it. Named keys decide; what they leave open is the nearest earlier one; and

@@ -116,6 +116,7 @@ fn of_mesh<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Option<Study>, RunError> {
     let tracer = Tracer::new(mesh);
+    tracer.prepare();
     let Some(bench) = Bench::new(&tracer, seed) else { return Ok(None) };
     let truth = bench.truth(progress)?;
     let mut rungs = Vec::new();
