@@ -145,7 +145,7 @@ fn axes<const D: usize>(projection: Projection) {
     let tracer = Tracer::new(&mesh);
     let camera = Camera::new(&View { projection, ..View::default() }).unwrap();
     let grid = camera.grid([40, 20, if D == 4 { 30 } else { 1 }]);
-    let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading: Shading::None };
+    let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading: Shading::None, device: None };
     let channels = [Channel::Opacity, Channel::Depth, Channel::Object, Channel::Rgba, Channel::Normal];
     let arrays = picture.slab(0..grid.dimensions[2], &channels, &Silent).unwrap();
     let [Values::F32(opacity), Values::F32(depth), Values::U16(object), Values::U8(rgba), Values::F32(normal)] =
@@ -195,7 +195,7 @@ fn slabs<const D: usize>() {
     let grid = camera.grid([9, 7, if D == 4 { 8 } else { 1 }]);
     let values: Vec<f32> = (0..mesh.vertices.len()).map(|i| (i % 10) as f32 / 10.0).collect();
     for shading in [Shading::Flat(&values), Shading::Smooth(&values)] {
-        let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading };
+        let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading, device: None };
         let whole = picture.slab(0..grid.dimensions[2], &Channel::ALL, &Silent).unwrap();
         for k in 0..grid.dimensions[2] {
             let layer = picture.slab(k..k + 1, &[Channel::AmbientOcclusion], &Silent).unwrap();

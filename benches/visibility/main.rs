@@ -93,7 +93,7 @@ fn main() {
                         row(way, prepare, wall, cpu, hits.iter().filter(|&&s| s != NOTHING).count());
                     }
                     let values = vec![0.5; mesh.vertices.len()];
-                    let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading: Shading::Smooth(&values) };
+                    let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading: Shading::Smooth(&values), device: None };
                     let channels = [Channel::Rgba, Channel::AmbientOcclusion, Channel::Opacity];
                     let (_, wall, cpu) = time(|| picture.slab(0..grid.dimensions[2], &channels, &Silent).expect("a picture"));
                     row("with shade", 0.0, wall, cpu, 0);

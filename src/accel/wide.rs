@@ -69,7 +69,8 @@ pub struct Scale<const D: usize> {
 }
 
 impl<const D: usize> Scale<D> {
-    fn of(vertices: &[Vector<D>]) -> Self {
+    /// Of the scene with these vertices.
+    pub fn of(vertices: &[Vector<D>]) -> Self {
         let bounds = Aabb::of(vertices);
         if bounds.is_empty() {
             return Self { centre: Vector64::zeros(), factor: 1.0 };

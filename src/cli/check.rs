@@ -1,5 +1,7 @@
 //! `ao4d check`: everything short of running.
 
+use ao4d::occlusion::opencl::OpenCl;
+use ao4d::pipeline::Backend;
 use clap::Args;
 
 use super::console::Console;
@@ -18,7 +20,10 @@ pub struct Check {
 
 impl Check {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
-        let (pipelines, _settings) = self.options.load_all(console)?;
+        let (pipelines, settings) = self.options.load_all(console)?;
+        if let Backend::OpenCl(place) = settings.backend {
+            OpenCl::open(place).map_err(|error| Failure::Failed(Box::new(error)))?;
+        }
         for pipeline in &pipelines {
             let counts = pipeline.prepare(|_| true)?.counts();
             let description = pipeline.plan.describe(&counts);

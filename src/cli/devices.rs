@@ -1,5 +1,6 @@
 //! `ao4d devices`: what could compute here.
 
+use ao4d::occlusion::opencl;
 use clap::Args;
 use serde::Serialize;
 
@@ -30,26 +31,94 @@ struct Processor {
 #[derive(Debug, Serialize)]
 struct Report {
     cpu: Processor,
-    /// The OpenCL devices: none, since this version computes on the processor only.
-    opencl: Vec<String>,
+    /// The OpenCL devices.
+    opencl: Vec<Device>,
+    /// Why there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    missing: Option<String>,
+}
+
+/// An OpenCL device.
+#[derive(Debug, Serialize)]
+struct Device {
+    /// What `--backend` takes.
+    backend: String,
+    name: String,
+    platform: String,
+    version: String,
+    driver: String,
+    compute_units: u32,
+    /// Bytes.
+    memory: u64,
+    /// Bytes that it takes in one piece.
+    largest_piece: u64,
+    double_precision: bool,
+    usable: bool,
+    /// Whether `--backend opencl` takes this one.
+    preferred: bool,
 }
 
 impl Devices {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
-        let report = Report { cpu: processor(), opencl: Vec::new() };
+        let (opencl, missing) = match opencl::devices() {
+            Ok(found) => (devices(&found), None),
+            Err(error) => (Vec::new(), Some(error.to_string())),
+        };
+        let report = Report { cpu: processor(), opencl, missing };
         if self.json {
             console.json(&report)?;
             return Ok(Outcome::Done);
         }
-        let Processor { name, architecture, threads, features } = report.cpu;
-        let name = name.unwrap_or_else(|| "processor".into());
+        let Processor { name, architecture, threads, features } = &report.cpu;
+        let name = name.as_deref().unwrap_or("processor");
         let features = if features.is_empty() { String::new() } else { format!(", {}", features.join(" ")) };
-        let plural = if threads == 1 { "" } else { "s" };
-        console.result(&format!(
-            "cpu     {name} ({architecture}), {threads} thread{plural}{features}\nopencl  not available in this version\n"
-        ))?;
+        let plural = if *threads == 1 { "" } else { "s" };
+        let mut text = format!("cpu         {name} ({architecture}), {threads} thread{plural}{features}\n");
+        for device in &report.opencl {
+            text += &device.line();
+        }
+        if let Some(missing) = &report.missing {
+            text += &format!("opencl      {missing}\n");
+        }
+        console.result(&text)?;
         Ok(Outcome::Done)
     }
+}
+
+impl Device {
+    fn line(&self) -> String {
+        let Device { backend, name, platform, version, driver, compute_units, .. } = self;
+        let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+        format!(
+            "{backend}  {name}, {compute_units} compute units, {:.1} GiB ({:.1} GiB in one piece), {}{}{}\n            \
+             {platform}, {version}, driver {driver}\n",
+            gib(self.memory),
+            gib(self.largest_piece),
+            if self.double_precision { "double precision" } else { "no double precision" },
+            if self.usable { "" } else { ", can't be used: not there now, or without a compiler" },
+            if self.preferred { "; what --backend opencl takes" } else { "" },
+        )
+    }
+}
+
+fn devices(found: &[opencl::Info]) -> Vec<Device> {
+    let preferred = opencl::preferred(found).map(|info| info.place);
+    found
+        .iter()
+        .map(|info| Device {
+            backend: format!("opencl:{}.{}", info.place.0, info.place.1),
+            name: info.name.clone(),
+            platform: info.platform.clone(),
+            version: info.version.clone(),
+            driver: info.driver.clone(),
+            compute_units: info.units,
+            memory: info.memory,
+            largest_piece: info.largest,
+            double_precision: info.double,
+            usable: info.usable,
+            preferred: preferred == Some(info.place),
+        })
+        .collect()
 }
 
 fn processor() -> Processor {

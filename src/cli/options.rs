@@ -47,12 +47,6 @@ impl PipelineOptions {
     /// Reads and checks the pipelines, and prints their warnings. One that is refused refuses them all.
     pub fn load_all(&self, console: &Console) -> Result<(Vec<Pipeline>, Settings), Failure> {
         let settings = Settings { backend: self.backend, threads: self.threads, force: self.force };
-        if let Backend::OpenCl(_) = settings.backend {
-            return Err(Failure::refused(format!(
-                "--backend {}: not available in this version; use cpu",
-                self.backend
-            )));
-        }
         if self.pipelines.len() > 1 && self.out.is_some() {
             return Err(Failure::refused(
                 "--out names one folder, and there are several pipelines; run them one by one",

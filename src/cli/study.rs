@@ -1,6 +1,6 @@
 //! `ao4d study`: error against time of the occlusion methods on a pipeline's scene.
 
-use ao4d::pipeline::{RunError, study};
+use ao4d::pipeline::{Backend, RunError, study};
 use clap::Args;
 
 use super::console::Console;
@@ -18,6 +18,9 @@ pub struct Study {
 impl Study {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         let (pipeline, settings) = self.options.load(console)?;
+        if settings.backend != Backend::Cpu {
+            return Err(Failure::refused("a study compares methods on the processor; use --backend cpu"));
+        }
         let watch = Watch::new(console)?;
         let study = study(&pipeline, &settings, &watch).map_err(|error| match error {
             RunError::Refused(error) => Failure::Refused(Box::new(error)),

@@ -8,8 +8,11 @@
 //! - the algorithm as it was published ([`Method::AsPublished`]), whose errors are those of its rays, not of its slips.
 
 use super::exact::{self, Budget};
-use super::vertices::{estimate_wanted, everywhere};
+use super::opencl::{self, Point};
+use super::vertices::{estimate_wanted, everywhere, spatial_order};
 use super::{Error, Estimate, Estimates, Level, Settings, Site, Slips, Stream, Target, as_published, estimate_at};
+use rayon::prelude::*;
+
 use crate::accel::Tracer;
 use crate::geometry::Vector;
 use crate::mesh::Incidence;
@@ -85,6 +88,79 @@ impl Method {
                 Ok(Estimates { values, errors, rays })
             }
         }
+    }
+
+    /// [`Method::at_wanted`] with the rays on an OpenCL device: the same bits. What takes no rays, or the published ones,
+    /// stays on the processor.
+    ///
+    /// # Errors
+    /// Those of [`Method::at_vertices`], and [`Error::OpenCl`].
+    pub fn at_wanted_on<const D: usize>(
+        &self,
+        scene: &opencl::Scene<D>,
+        wanted: Option<&[bool]>,
+        progress: &dyn Progress,
+    ) -> Result<Estimates, Error> {
+        if matches!(self, Self::Exact(_) | Self::AsPublished(..)) {
+            return self.at_wanted(scene.tracer(), wanted, progress);
+        }
+        let mut order = spatial_order(scene.tracer());
+        let count = order.len();
+        order.retain(|&vertex| wanted.is_none_or(|wanted| wanted[vertex as usize]));
+        let points: Vec<Point<D>> = order.iter().map(|&vertex| Point::Vertex(vertex)).collect();
+        let found = self.at_points_on(scene, &points, progress)?;
+        let mut estimates = Estimates { values: vec![1.0; count], errors: vec![f32::NAN; count], rays: 0 };
+        for (&vertex, estimate) in order.iter().zip(found) {
+            estimates.values[vertex as usize] = estimate.value;
+            estimates.errors[vertex as usize] = estimate.error;
+            estimates.rays += u64::from(estimate.rays);
+        }
+        Ok(estimates)
+    }
+
+    /// Whether it asks rays at visible points, which an OpenCL device may trace.
+    pub fn is_traced(&self) -> bool {
+        !matches!(self, Self::Exact(_))
+    }
+
+    /// The values at points, with the rays on an OpenCL device; in closed form only where [`Method::Adaptive`] takes it. None of
+    /// [`Method::Exact`], which asks no rays.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` says so, [`Error::OpenCl`] if a call fails.
+    pub fn at_points_on<const D: usize>(
+        &self,
+        scene: &opencl::Scene<D>,
+        points: &[Point<D>],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Estimate>, Error> {
+        let (settings, target, closed) = match *self {
+            Self::Sampled(settings, target) => (settings, target, false),
+            Self::Adaptive(settings, target) => (settings, target, settings.max_distance == f32::INFINITY),
+            Self::AsPublished(settings, _) => (settings, None, false),
+            Self::Exact(_) => return Ok(Vec::new()),
+        };
+        if !closed {
+            return scene.estimate(points, &settings, target, progress);
+        }
+        let tracer = scene.tracer();
+        let incidence = Incidence::new(tracer.mesh());
+        let simple = |point: &Point<D>| {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            Ok(match point {
+                Point::Vertex(vertex) => exact::at_vertex_if_simple(tracer, &incidence, *vertex, SIMPLE, PIECES),
+                Point::Inside { position, normal, simplex, .. } => {
+                    exact::at_point_if_simple(tracer, position, normal, *simplex, SIMPLE, PIECES)
+                }
+            })
+        };
+        let known: Vec<Option<f64>> = points.par_iter().with_max_len(BATCH).map(simple).collect::<Result<_, _>>()?;
+        progress.advance(known.iter().flatten().count() as u64);
+        let rest: Vec<Point<D>> = points.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(p, _)| *p).collect();
+        let mut rest = scene.estimate(&rest, &settings, target, progress)?.into_iter();
+        Ok(known.into_iter().filter_map(|k| k.map(Estimate::known).or_else(|| rest.next())).collect())
     }
 
     /// The value at a visible point inside a simplex, on the side that its normal points to. `number` tells points

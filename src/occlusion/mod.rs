@@ -18,6 +18,7 @@ mod estimate;
 pub mod exact;
 mod file;
 mod method;
+pub mod opencl;
 mod sampling;
 mod site;
 mod stream;
@@ -64,6 +65,9 @@ pub enum Error {
         /// How rich its view is.
         source: exact::OverBudget,
     },
+    /// OpenCL fails.
+    #[error(transparent)]
+    OpenCl(#[from] opencl::Error),
 }
 
 impl From<Cancelled> for Error {

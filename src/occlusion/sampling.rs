@@ -144,6 +144,11 @@ pub(super) fn scramble_reversed(x: u32, key: u32) -> u32 {
 /// Direction numbers of the second and third Sobol' dimension (Joe and Kuo 2008); the first is the reversed index.
 const SOBOL: [[u32; 32]; 2] = [sobol_matrix(1, 0, &[1]), sobol_matrix(2, 1, &[1, 3])];
 
+/// The direction numbers of the second and third dimension, one after the other.
+pub(super) fn sobol_matrices() -> Vec<u32> {
+    SOBOL.concat()
+}
+
 /// Direction numbers from a primitive polynomial of degree `s` with inner coefficients `a`, and initial values `m`.
 const fn sobol_matrix(s: usize, a: u32, m: &[u32]) -> [u32; 32] {
     let mut v = [0u32; 32];

@@ -160,7 +160,7 @@ pub(super) fn everywhere<const D: usize, S>(
 
 /// All vertices, those that are close in the hierarchy close to each other: then the nodes that one of them needs are
 /// still in the cache for the next.
-fn spatial_order<const D: usize>(tracer: &Tracer<D>) -> Vec<u32> {
+pub(super) fn spatial_order<const D: usize>(tracer: &Tracer<D>) -> Vec<u32> {
     let mesh: &Mesh<D> = tracer.mesh();
     let mut seen = vec![false; mesh.vertices.len()];
     let mut order = Vec::with_capacity(mesh.vertices.len());

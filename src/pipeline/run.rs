@@ -16,12 +16,14 @@ use super::occlude::{errors_file, kept, method, most_rays};
 use super::plan::{Computation, OcclusionSource, Plan, RenderPlan, StageRef, grouped};
 use super::prepare::{Loaded, Prepared, sidecar_path};
 use super::report::{FileReport, Report};
+use super::settings::Backend;
 use super::spec;
 use super::work::Stale;
 use super::{Error, Pipeline, Settings, figure, limits};
 use crate::accel::Tracer;
 use crate::export;
 use crate::mesh::Mesh;
+use crate::occlusion::opencl::{self, OpenCl};
 use crate::occlusion::{self, Cancelled, Estimates};
 use crate::progress::Progress;
 use crate::render::{CameraError, NOTHING, Picture, Shading, Visibility};
@@ -38,6 +40,9 @@ pub enum RunError {
     /// There are no values of ambient occlusion.
     #[error("ambient occlusion: {0}")]
     Occlusion(occlusion::Error),
+    /// The OpenCL device fails, or there is none.
+    #[error(transparent)]
+    OpenCl(#[from] opencl::Error),
     /// A file can't be written.
     #[error(transparent)]
     Export(#[from] export::Error),
@@ -65,6 +70,7 @@ impl From<occlusion::Error> for RunError {
     fn from(error: occlusion::Error) -> Self {
         match error {
             occlusion::Error::Cancelled => Self::Cancelled(Cancelled),
+            occlusion::Error::OpenCl(error) => Self::OpenCl(error),
             error => Self::Occlusion(error),
         }
     }
@@ -83,6 +89,10 @@ pub fn run(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) ->
 fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
     let began = Instant::now();
     let plan = &pipeline.plan;
+    let opencl = match settings.backend {
+        Backend::Cpu => None,
+        Backend::OpenCl(place) => Some(OpenCl::open(place)?),
+    };
     let keys = Keys::new(plan);
     let cache = Cache::open(&plan.out, settings.force);
     let stale = Stale::new(plan, &keys, &cache);
@@ -96,7 +106,8 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     }
     let building = began.elapsed();
     let report = Report { out: plan.out.clone(), ..Report::default() };
-    let mut run = Run { plan, keys, cache, stale, loaded, progress, report, times: BTreeMap::new() };
+    let opencl = opencl.as_ref();
+    let mut run = Run { plan, opencl, keys, cache, stale, loaded, progress, report, times: BTreeMap::new() };
     for (scene, mesh) in meshes.into_iter().enumerate() {
         match mesh {
             Some(AnyMesh::Three(mesh)) => run.scene(scene, &mesh, building)?,
@@ -122,6 +133,7 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
 /// A run in progress.
 struct Run<'p> {
     plan: &'p Plan,
+    opencl: Option<&'p OpenCl>,
     keys: Keys,
     cache: Cache,
     stale: Stale,
@@ -135,13 +147,20 @@ struct Run<'p> {
 struct Scene<'m, const D: usize> {
     mesh: &'m Mesh<D>,
     hash: String,
-    tracer: OnceCell<Tracer<'m, D>>,
+    tracer: &'m Tracer<'m, D>,
+    opencl: Option<&'m OpenCl>,
+    device: OnceCell<opencl::Scene<'m, D>>,
     values: BTreeMap<usize, Estimates>,
 }
 
 impl<'m, const D: usize> Scene<'m, D> {
-    fn tracer(&self) -> &Tracer<'m, D> {
-        self.tracer.get_or_init(|| Tracer::new(self.mesh))
+    /// What is on the OpenCL device, if there is one; brought there when first asked for.
+    fn device(&self) -> Result<Option<&opencl::Scene<'m, D>>, RunError> {
+        let Some(opencl) = self.opencl else { return Ok(None) };
+        if self.device.get().is_none() {
+            let _ = self.device.set(opencl::Scene::new(opencl, self.tracer)?);
+        }
+        Ok(self.device.get())
     }
 }
 
@@ -164,7 +183,9 @@ impl Run<'_> {
                 mesh.simplices.len()
             ));
         }
-        let mut scene = Scene { mesh, hash: mesh.content_hash(), tracer: OnceCell::new(), values: BTreeMap::new() };
+        let tracer = Tracer::new(mesh);
+        let (hash, device, values) = (mesh.content_hash(), OnceCell::new(), BTreeMap::new());
+        let mut scene = Scene { mesh, hash, tracer: &tracer, opencl: self.opencl, device, values };
         let plan = self.plan;
         for &stage in &plan.order {
             let start = Instant::now();
@@ -266,7 +287,11 @@ impl Run<'_> {
                         let wanted = self.wanted(index, computation, scene)?;
                         let asked = wanted.as_ref().map_or(count, |w| w.iter().filter(|&&w| w).count());
                         self.progress.begin(&format!("occlusion {}", occlusion.id), asked as u64);
-                        let found = method(computation).at_wanted(scene.tracer(), wanted.as_deref(), self.progress);
+                        let (method, wanted) = (method(computation), wanted.as_deref());
+                        let found = match scene.device()? {
+                            Some(device) => method.at_wanted_on(device, wanted, self.progress),
+                            None => method.at_wanted(scene.tracer, wanted, self.progress),
+                        };
                         self.progress.end();
                         let found = found?;
                         self.times.entry(StageRef::Occlusion(index)).or_default().1 = rate(&found, start.elapsed());
@@ -302,7 +327,8 @@ impl Run<'_> {
         for (_, render) in renders {
             let camera = camera::<D>(&render.camera)?;
             let grid = camera.grid(render.dimensions);
-            let visibility = Visibility::new(scene.tracer(), &camera, &grid, render.visibility);
+            let visibility = Visibility::new(scene.tracer, &camera, &grid, render.visibility);
+            let visibility = visibility.on(scene.device()?);
             left = left.saturating_sub(visibility.cost());
             if left == 0 {
                 return Ok(None);
@@ -336,7 +362,9 @@ impl Run<'_> {
         }
         let camera = camera::<D>(&render.camera)?;
         let grid = camera.grid(render.dimensions);
-        let picture = Picture { tracer: scene.tracer(), grid, camera, shading: shading(plan, render, &scene.values) };
+        let device = scene.device()?;
+        let shading = shading(plan, render, &scene.values);
+        let picture = Picture { tracer: scene.tracer, grid, camera, shading, device };
         let start = Instant::now();
         let visibility = picture.visibility(render.visibility);
         let mut files = PictureFiles::create(plan, index, &self.stale, &grid, &scene.hash)?;

@@ -20,7 +20,7 @@ pub use visibility::{NOTHING, Visibility};
 use std::ops::Range;
 
 use crate::accel::Tracer;
-use crate::occlusion::Error;
+use crate::occlusion::{Error, opencl};
 use crate::progress::Progress;
 use crate::volume::{Array, Grid};
 
@@ -35,6 +35,8 @@ pub struct Picture<'s, const D: usize> {
     pub grid: Grid,
     /// Where their ambient occlusion comes from.
     pub shading: Shading<'s>,
+    /// The device that traces rays, if not the processor.
+    pub device: Option<&'s opencl::Scene<'s, D>>,
 }
 
 impl<const D: usize> Picture<'_, D> {
@@ -53,7 +55,7 @@ impl<const D: usize> Picture<'_, D> {
 
     /// What finds what its voxels see; made once for all slabs.
     pub fn visibility(&self, method: visibility::Method) -> Visibility<'_, D> {
-        Visibility::new(self.tracer, &self.camera, &self.grid, method)
+        Visibility::new(self.tracer, &self.camera, &self.grid, method).on(self.device)
     }
 
     /// [`Picture::slab`] with what [`Picture::visibility`] made.

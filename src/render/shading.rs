@@ -5,8 +5,9 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::{NOTHING, Picture};
-use crate::geometry::{Cone, Ray, Vector, Vector64, narrow, normal_of, widen};
+use crate::geometry::{Cone, Crossing, Ray, Vector, Vector64, narrow, normal_of, widen};
 use crate::mesh::normals::unit;
+use crate::occlusion::opencl::{self, Point};
 use crate::occlusion::{Error, Method};
 use crate::progress::Progress;
 
@@ -46,6 +47,11 @@ pub(super) fn shade<const D: usize>(
     visible: &[u32],
     progress: &dyn Progress,
 ) -> Result<Vec<Fragment>, Error> {
+    if let (Shading::Voxel(method), Some(device)) = (&picture.shading, picture.device)
+        && method.is_traced()
+    {
+        return shade_on(picture, *method, device, layers, visible, progress);
+    }
     let [width, height, _] = picture.grid.dimensions;
     let mut fragments = vec![Fragment::BACKGROUND; visible.len()];
     let rows = fragments.par_chunks_mut(width).zip(visible.par_chunks(width)).enumerate();
@@ -69,6 +75,49 @@ pub(super) fn shade<const D: usize>(
         Ok(())
     })?;
     Ok(fragments)
+}
+
+/// [`shade`] with the occlusion of the visible points by a device, all of a slab together.
+fn shade_on<const D: usize>(
+    picture: &Picture<D>,
+    method: Method,
+    device: &opencl::Scene<D>,
+    layers: Range<usize>,
+    visible: &[u32],
+    progress: &dyn Progress,
+) -> Result<Vec<Fragment>, Error> {
+    let [width, height, _] = picture.grid.dimensions;
+    let seen: Vec<usize> = (0..visible.len()).filter(|&n| visible[n] != NOTHING).collect();
+    progress.advance((visible.len() - seen.len()) as u64);
+    let found = seen.par_iter().map(|&n| {
+        let (index, simplex) = ([n % width, n / width % height, layers.start + n / width / height], visible[n]);
+        let ray = picture.camera.voxel_ray(&picture.grid, index);
+        let crossing = Cone::of_simplex(&ray.origin, &picture.tracer.mesh().corners(simplex)).crossing(&ray.direction);
+        let (position, normal) = visible_point(picture, simplex, &ray, &crossing);
+        let number = (index[0] + width * (index[1] + height * index[2])) as u64;
+        let depth = (crossing.t * widen(&ray.direction).norm()) as f32;
+        (Point::Inside { position, normal, simplex, number }, depth)
+    });
+    let (points, depths): (Vec<Point<D>>, Vec<f32>) = found.unzip();
+    let values = method.at_points_on(device, &points, progress)?;
+    let mut fragments = vec![Fragment::BACKGROUND; visible.len()];
+    for ((&n, estimate), depth) in seen.iter().zip(values).zip(depths) {
+        let ambient_occlusion = estimate.value.clamp(0.0, 1.0);
+        fragments[n] = Fragment { simplex: visible[n], ambient_occlusion, depth };
+    }
+    Ok(fragments)
+}
+
+/// The point of a simplex that a ray meets, and the normal there on the side that the ray comes from.
+fn visible_point<const D: usize>(
+    picture: &Picture<D>,
+    simplex: u32,
+    ray: &Ray<D>,
+    crossing: &Crossing<D>,
+) -> (Vector<D>, Vector<D>) {
+    let corners = picture.tracer.mesh().corners(simplex).map(|v| widen(&v));
+    let point = (0..D).fold(Vector64::zeros(), |p, i| p + corners[i] * crossing.barycentric[i]);
+    (narrow(&point), facing_normal(&corners, ray))
 }
 
 /// The cone that was asked for last: in perspective that of the voxel before will mostly do.
@@ -102,11 +151,9 @@ fn shade_voxel<const D: usize>(
         Shading::Flat(values) => ((0..D).map(|i| corner(values, i)).sum::<f64>() / D as f64) as f32,
         Shading::Smooth(values) => (0..D).map(|i| corner(values, i) * crossing.barycentric[i]).sum::<f64>() as f32,
         Shading::Voxel(method) => {
-            let corners = mesh.corners(simplex).map(|v| widen(&v));
-            let point = (0..D).fold(Vector64::zeros(), |p, i| p + corners[i] * crossing.barycentric[i]);
-            let normal = facing_normal(&corners, &ray);
+            let (point, normal) = visible_point(picture, simplex, &ray, &crossing);
             let place = || format!("voxel ({}, {}, {})", index[0], index[1], index[2]);
-            method.at_point(picture.tracer, &narrow(&point), &normal, simplex, number, place)?.value
+            method.at_point(picture.tracer, &point, &normal, simplex, number, place)?.value
         }
     };
     let depth = crossing.t * widen(&ray.direction).norm();

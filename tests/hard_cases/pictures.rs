@@ -27,7 +27,7 @@ fn voxels_on_facets<const D: usize>(half: bool, perspective: bool) -> usize {
     let eye = View::<D>::default().eye * distance;
     let camera = Camera::new(&View { eye, projection, ..View::default() }).unwrap();
     let grid = camera.grid([count, count, if D == 4 { count } else { 1 }]);
-    let picture = Picture { tracer: &tracer, camera, grid, shading: Shading::None };
+    let picture = Picture { tracer: &tracer, camera, grid, shading: Shading::None, device: None };
     let arrays = picture.slab(0..grid.dimensions[2], &[Channel::Opacity, Channel::Depth], &Silent).unwrap();
     let (Values::F32(opacity), Values::F32(depth)) = (&arrays[0].values, &arrays[1].values) else { panic!("types") };
     let mut wrong = 0;

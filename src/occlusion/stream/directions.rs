@@ -148,8 +148,9 @@ impl<const D: usize> Rays<D> {
         }
     }
 
-    /// Uses these directions.
+    /// Uses these directions, none longer than 1: bounds on rounding and the cones around groups rely on that.
     pub fn set(&mut self, directions: &[Vector<D>]) {
+        debug_assert!(directions.iter().all(|d| d.norm_squared() < 1.0 + 1e-5));
         for (i, direction) in directions.iter().enumerate().take(BLOCK) {
             (0..D).for_each(|k| self.direction[k][i] = direction[k]);
             self.height[i] = 0.0;

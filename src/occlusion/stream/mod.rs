@@ -100,7 +100,7 @@ impl<const D: usize> Stream<D> {
         self.traced(&question, Some((normal, identity)), incidence.around(identity), source).estimate()
     }
 
-    /// How many of the rays from a point in these directions, each of length 1, hit a simplex other than `ignored`
+    /// How many of the rays from a point in these directions, none longer than 1, hit a simplex other than `ignored`
     /// within `limit`; as [`Tracer::occluded`] tells ray by ray. If the directions are those of a hemisphere, its
     /// middle as `normal` saves work; else it may be zero.
     pub fn count_occluded(

@@ -68,7 +68,7 @@ pub fn measure<const D: usize>(
     // Each is cancelled by the outer progress, and told as one step of it.
     let watch = Steps(progress);
     let image = |shading: Shading| -> Result<Vec<Array>, Error> {
-        let picture = Picture { tracer, camera: camera.clone(), grid, shading };
+        let picture = Picture { tracer, camera: camera.clone(), grid, shading, device: None };
         picture.slab(0..dimensions[2], &[Channel::AmbientOcclusion, Channel::Opacity], &watch)
     };
     let settings = |samples| Settings { sampler: Sampler::Sobol, samples, seed, max_distance: f32::INFINITY };

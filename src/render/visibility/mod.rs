@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use self::raster::Raster;
 use super::Camera;
 use crate::accel::Tracer;
-use crate::occlusion::Cancelled;
+use crate::occlusion::{Cancelled, Error, opencl};
 use crate::progress::Progress;
 use crate::volume::Grid;
 
@@ -49,6 +49,8 @@ pub struct Visibility<'s, const D: usize> {
     camera: Camera<D>,
     grid: Grid,
     raster: Option<Raster>,
+    method: Method,
+    device: Option<&'s opencl::Scene<'s, D>>,
 }
 
 impl<'s, const D: usize> Visibility<'s, D> {
@@ -59,7 +61,17 @@ impl<'s, const D: usize> Visibility<'s, D> {
         if raster.is_none() {
             tracer.prepare();
         }
-        Self { tracer, camera: camera.clone(), grid: *grid, raster }
+        Self { tracer, camera: camera.clone(), grid: *grid, raster, method, device: None }
+    }
+
+    /// Has rays cast by this device, if one is given. One that isn't the processor itself casts rays rather than the
+    /// processor scan-converts, unless that was asked for.
+    pub fn on(mut self, device: Option<&'s opencl::Scene<'s, D>>) -> Self {
+        self.device = device;
+        if self.method == Method::Auto && device.is_some_and(|d| d.info().kind != opencl::Kind::Cpu) {
+            self.raster = None;
+        }
+        self
     }
 
     /// The way that was chosen; never [`Method::Auto`].
@@ -76,12 +88,30 @@ impl<'s, const D: usize> Visibility<'s, D> {
     /// The simplex that the ray through each voxel of some layers hits first, x fastest, or [`NOTHING`].
     ///
     /// # Errors
-    /// [`Cancelled`] if `progress` says so.
-    pub fn first_hits(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Cancelled> {
-        match &self.raster {
-            Some(raster) => raster.first_hits(self.tracer, &self.camera, &self.grid, layers, progress),
-            None => self.ray_cast(layers, progress),
+    /// [`Error::Cancelled`] if `progress` says so, [`Error::OpenCl`] if a device fails.
+    pub fn first_hits(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
+        match (&self.raster, self.device) {
+            (Some(raster), _) => Ok(raster.first_hits(self.tracer, &self.camera, &self.grid, layers, progress)?),
+            (None, None) => Ok(self.ray_cast(layers, progress)?),
+            (None, Some(device)) => self.ray_cast_on(device, layers, progress),
         }
+    }
+
+    fn ray_cast_on(
+        &self,
+        device: &opencl::Scene<D>,
+        layers: Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<u32>, Error> {
+        let [width, height, _] = self.grid.dimensions;
+        let mut visible = Vec::with_capacity(self.grid.layer_len() * layers.len());
+        for k in layers {
+            let ray = |n: usize| self.camera.voxel_ray(&self.grid, [n % width, n / width, k]);
+            let rays: Vec<_> = (0..width * height).into_par_iter().map(ray).collect();
+            visible.extend(device.first_hits(&rays, progress)?);
+            progress.advance(rays.len() as u64);
+        }
+        Ok(visible)
     }
 
     fn ray_cast(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Cancelled> {

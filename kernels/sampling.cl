@@ -1,0 +1,109 @@
+/* The directions of src/occlusion/sampling.rs, by the same operations in the same order: the same bits. Products must
+   not be fused into sums, and divisions and roots must be rounded correctly; the host tries both beforehand. */
+
+#pragma OPENCL FP_CONTRACT OFF
+
+uint reversed(uint x) {
+    x = (x >> 1 & 0x55555555u) | (x & 0x55555555u) << 1;
+    x = (x >> 2 & 0x33333333u) | (x & 0x33333333u) << 2;
+    x = (x >> 4 & 0x0f0f0f0fu) | (x & 0x0f0f0f0fu) << 4;
+    x = (x >> 8 & 0x00ff00ffu) | (x & 0x00ff00ffu) << 8;
+    return x >> 16 | x << 16;
+}
+
+/* Owen's scrambling of the bits, highest first. */
+uint scramble(uint x, uint key) {
+    x = reversed(x);
+    x ^= x * 0x3d20adeau;
+    x += key;
+    x *= key >> 16 | 1u;
+    x ^= x * 0x05526c56u;
+    x ^= x * 0x53a22864u;
+    return reversed(x);
+}
+
+uint sobol(uint index, uint dimension, __global const uint *matrices) {
+    if (dimension == 0) return reversed(index);
+    uint x = 0;
+    __global const uint *matrix = matrices + 32 * (dimension - 1);
+    for (uint bit = 0; index != 0; bit++, index >>= 1)
+        if (index & 1u) x ^= matrix[bit];
+    return x;
+}
+
+float unit(uint bits) {
+    return ((float)(bits >> 8) + 0.5f) * (1.0f / 8388608.0f) - 1.0f;
+}
+
+/* Sine and cosine of x pi / 4. */
+float2 sin_cos_quarter(float x) {
+    float y = x * 0.785398163397448309615660845819875721f;
+    float z = y * y;
+    float s = y * (1.0f + z * (-1.0f / 6.0f + z * (1.0f / 120.0f + z * (-1.0f / 5040.0f + z * (1.0f / 362880.0f)))));
+    float c = 1.0f + z * (-0.5f + z * (1.0f / 24.0f + z * (-1.0f / 720.0f + z * (1.0f / 40320.0f))));
+    return (float2)(s, c);
+}
+
+/* The square onto the disk. */
+float2 square_to_disk(float a, float b) {
+    if (a == 0.0f && b == 0.0f) return (float2)(0.0f, 0.0f);
+    if (fabs(a) > fabs(b)) {
+        float2 t = sin_cos_quarter(b / a);
+        return (float2)(a * t.y, a * t.x);
+    }
+    float2 t = sin_cos_quarter(a / b);
+    return (float2)(b * t.x, b * t.y);
+}
+
+/* The cube onto the ball. */
+float4 cube_to_ball(float a, float b, float c) {
+    float2 xy = square_to_disk(a, b);
+    float radius = max(fabs(a), fabs(b));
+    float shell = max(radius, fabs(c));
+    if (shell == 0.0f) return (float4)(0.0f, 0.0f, 0.0f, 0.0f);
+    float cosine;
+    if (fabs(c) >= radius) {
+        float r = radius / shell;
+        cosine = copysign(1.0f - r * r * (1.0f / 3.0f), c);
+    } else {
+        cosine = c / shell * (2.0f / 3.0f);
+    }
+    float across = radius == 0.0f ? 0.0f : shell * sqrt(max(1.0f - cosine * cosine, 0.0f)) / radius;
+    return (float4)(xy.x * across, xy.y * across, shell * cosine, 0.0f);
+}
+
+/* Ray number `next` of a site. */
+float4 sampled(Site site, uint next, __global const uint *matrices) {
+    uint index = scramble(next, site.keys.w);
+    float a = unit(scramble(sobol(index, 0, matrices), site.keys.x));
+    float b = unit(scramble(sobol(index, 1, matrices), site.keys.y));
+    float4 local_;
+    float square;
+#if D == 4
+    float c = unit(scramble(sobol(index, 2, matrices), site.keys.z));
+    local_ = cube_to_ball(a, b, c);
+    square = local_.x * local_.x + local_.y * local_.y;
+    square = square + local_.z * local_.z;
+    local_.w = sqrt(max(1.0f - square, LOWEST_SQUARED_COSINE));
+    float product = site.axis.x * local_.x + site.axis.y * local_.y;
+    product = product + site.axis.z * local_.z;
+    product = product + site.axis.w * local_.w;
+#else
+    float2 disk = square_to_disk(a, b);
+    local_ = (float4)(disk.x, disk.y, 0.0f, 0.0f);
+    square = local_.x * local_.x + local_.y * local_.y;
+    local_.z = sqrt(max(1.0f - square, LOWEST_SQUARED_COSINE));
+    float product = site.axis.x * local_.x + site.axis.y * local_.y;
+    product = product + site.axis.z * local_.z;
+#endif
+    float scale = site.factor * product;
+    float4 world = local_ - scale * site.axis;
+    return site.turned ? -world : world;
+}
+
+/* Directions alone, to see whether this device makes the right ones. */
+__kernel void directions(__global const Site *sites, __global const uint *matrices, uint rays, __global float4 *out) {
+    size_t i = get_global_id(0);
+    Site site = sites[i / rays];
+    out[i] = sampled(site, site.next + (uint)(i % rays), matrices);
+}

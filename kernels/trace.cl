@@ -1,0 +1,178 @@
+/* Rays through the binary hierarchy of src/accel/bvh.rs. STACK is its depth, told by the host. */
+
+/* In single precision and, where that leaves doubt and the device can, in double. */
+uint met(float4 position, float4 way, __global const float4 *corners, float limit, float *t, float *t_error) {
+    /* Of a simplex with a corner here nothing is seen. */
+    for (int i = 0; i < D; i++)
+        if (all(corners[i] == position)) return OPEN;
+    float single_t, single_error;
+    uint found = meets_single(position, way, corners, &single_t, &single_error);
+    *t = single_t;
+    *t_error = single_error;
+#ifdef DOUBLE
+    if (found == UNSURE) {
+        double double_t, double_error;
+        found = meets_double(position, way, corners, &double_t, &double_error);
+        *t = (float)double_t;
+        *t_error = (float)double_error + *t * 1e-6f;
+    }
+#endif
+    if (found != HIT || limit == INFINITY) return found;
+    if (*t + *t_error < limit * (1.0f - 1e-6f)) return HIT;
+    return *t - *t_error > limit * (1.0f + 1e-6f) ? OPEN : UNSURE;
+}
+
+/* The distance at which the ray enters a box, or INFINITY where it misses it. Boxes are a little larger than what they
+   hold, and distances are taken a little wider than they are, more than any rounding: no box is missed that holds a
+   hit. What is not a number changes nothing. */
+float2 clipped(float2 range, float low, float high, float inverse) {
+    float nearer = inverse < 0.0f ? high : low, farther = inverse < 0.0f ? low : high;
+    return (float2)(nearer > range.x ? nearer : range.x, farther < range.y ? farther : range.y);
+}
+
+float enters(__global const Node *node, float4 position, float4 inverse, float limit) {
+    float4 a = (node->low - position) * inverse;
+    float4 b = (node->high - position) * inverse;
+    float2 range = (float2)(0.0f, limit);
+    range = clipped(range, a.x, b.x, inverse.x);
+    range = clipped(range, a.y, b.y, inverse.y);
+    range = clipped(range, a.z, b.z, inverse.z);
+#if D == 4
+    range = clipped(range, a.w, b.w, inverse.w);
+#endif
+    return range.x * (1.0f - 2e-6f) <= range.y * (1.0f + 2e-6f) ? range.x : INFINITY;
+}
+
+/* As geometry::Ray: components that would overflow the reciprocal are zero. */
+float4 cleaned(float4 way) {
+    way.x = fabs(way.x) < 1e-30f ? 0.0f : way.x;
+    way.y = fabs(way.y) < 1e-30f ? 0.0f : way.y;
+    way.z = fabs(way.z) < 1e-30f ? 0.0f : way.z;
+    way.w = fabs(way.w) < 1e-30f ? 0.0f : way.w;
+    return way;
+}
+
+/* What the simplices around the point hide. */
+uint folded(Site site, float4 way, __global const Fold *folds) {
+    uint found = OPEN;
+    float size = fabs(way.x) + fabs(way.y) + fabs(way.z) + fabs(way.w);
+    for (uint i = 0; i < site.fold_count; i++) {
+        __global const Fold *fold = folds + site.fold_first + i;
+        uint inside = 0, outside = 0;
+        float bounds[4] = {fold->bounds.x, fold->bounds.y, fold->bounds.z, fold->bounds.w};
+        for (int k = 0; k < D; k++) {
+            float4 n = fold->normals[k];
+            float height = n.x * way.x + n.y * way.y + n.z * way.z + n.w * way.w;
+            inside += height > bounds[k] * size;
+            outside += -height > bounds[k] * size;
+        }
+        if (inside == D) return HIT;
+        if (outside == 0) found = UNSURE;
+    }
+    return found;
+}
+
+/* Whether anything blocks each ray of each site: for every ray HIT, OPEN or UNSURE, which the host settles. Rays come from
+   `given`, or where that is not used from the sites' sequences. */
+__kernel void occluded(
+    __global const Node *nodes, __global const float4 *corners, __global const uint *simplices, uint empty,
+    __global const Site *sites, __global const Fold *folds, __global const uint *matrices,
+    __global const float4 *given, uint use_given, uint rays, ulong count, float limit, __global uchar *out) {
+    size_t i = get_global_id(0);
+    if (i >= count) return;
+    Site site = sites[i / rays];
+    float4 way = cleaned(use_given ? given[i] : sampled(site, site.next + (uint)(i % rays), matrices));
+    uint found = folded(site, way, folds);
+    if (found == HIT || empty) {
+        out[i] = (uchar)found;
+        return;
+    }
+    float4 inverse = 1.0f / way;
+    uint stack[STACK];
+    uint depth = 0, index = 0;
+    if (enters(nodes, site.position, inverse, limit) == INFINITY) {
+        out[i] = (uchar)found;
+        return;
+    }
+    for (;;) {
+        uint first = nodes[index].first, inside = nodes[index].count;
+        if (inside == 0) {
+            /* The nearer child first; what it holds is more likely to block. */
+            float left = enters(nodes + first, site.position, inverse, limit);
+            float right = enters(nodes + first + 1, site.position, inverse, limit);
+            uint nearer = first + (right < left);
+            if (left != INFINITY || right != INFINITY) {
+                if (left != INFINITY && right != INFINITY) stack[depth++] = first + (right >= left);
+                index = nearer;
+                continue;
+            }
+        } else {
+            for (uint k = first; k < first + inside; k++) {
+                if (simplices[k] == site.ignored) continue;
+                float t, t_error;
+                uint one = met(site.position, way, corners + D * (size_t)k, limit, &t, &t_error);
+                if (one == HIT) {
+                    out[i] = HIT;
+                    return;
+                }
+                if (one == UNSURE) found = UNSURE;
+            }
+        }
+        if (depth == 0) break;
+        index = stack[--depth];
+    }
+    out[i] = (uchar)found;
+}
+
+/* The simplex that each ray hits first: its number, NONE if there is none, or UNSURE_SIMPLEX. */
+#define UNSURE_SIMPLEX 0xfffffffeu
+
+__kernel void first_hit(
+    __global const Node *nodes, __global const float4 *corners, __global const uint *simplices, uint empty,
+    __global const float4 *origins, __global const float4 *ways, ulong count, __global uint *out) {
+    size_t i = get_global_id(0);
+    if (i >= count) return;
+    float4 position = origins[i], way = cleaned(ways[i]);
+    float4 inverse = 1.0f / way;
+    uint best = NONE;
+    float nearest = INFINITY, error = 0.0f, doubt = INFINITY;
+    uint stack[STACK];
+    uint depth = 0, index = 0;
+    if (empty || enters(nodes, position, inverse, INFINITY) == INFINITY) {
+        out[i] = NONE;
+        return;
+    }
+    for (;;) {
+        uint first = nodes[index].first, inside = nodes[index].count;
+        float limit = nearest + error;
+        if (inside == 0) {
+            float left = enters(nodes + first, position, inverse, limit);
+            float right = enters(nodes + first + 1, position, inverse, limit);
+            if (left != INFINITY || right != INFINITY) {
+                if (left != INFINITY && right != INFINITY) stack[depth++] = first + (right >= left);
+                index = first + (right < left);
+                continue;
+            }
+        } else {
+            for (uint k = first; k < first + inside; k++) {
+                float t, t_error;
+                uint one = met(position, way, corners + D * (size_t)k, INFINITY, &t, &t_error);
+                if (one == OPEN) continue;
+                if (one == UNSURE) {
+                    /* It may be hit, as near as its box. */
+                    doubt = 0.0f;
+                    continue;
+                }
+                if (best != NONE && fabs(t - nearest) <= t_error + error) doubt = min(doubt, max(t, nearest));
+                if (t < nearest) {
+                    best = simplices[k];
+                    nearest = t;
+                    error = t_error;
+                }
+            }
+        }
+        if (depth == 0) break;
+        index = stack[--depth];
+    }
+    out[i] = doubt <= nearest + error ? UNSURE_SIMPLEX : best;
+}

@@ -1,0 +1,51 @@
+//! Ambient occlusion, and what voxels see, on any OpenCL device: the same bits as on the processor.
+//!
+//! What a ray hits is defined by exact signs. A device settles nearly all rays in single precision, beside a bound on the
+//! rounding, some more in double precision if it has that, and leaves the rest to the host, which decides exactly. So the
+//! device's arithmetic need not be like the host's, with one exception: the directions of the rays, which it makes from
+//! integers by few, correctly rounded operations. Whether it does that right is tried when it is opened; if not, they
+//! are made here and handed over.
+//!
+//! - [`devices()`]: what there is;
+//! - `device`: an open device, the only file that calls OpenCL;
+//! - `layout`, `program`: the structs and the text of the kernels (`kernels/*.cl`);
+//! - [`Scene`]: a mesh with its hierarchy on a device;
+//! - `points`: shading points, in batches short enough for watchdogs and for whoever wants to stop.
+//!
+//! libOpenCL is opened at run time; nothing of it is needed to build, or to run without it.
+
+mod device;
+mod devices;
+mod error;
+mod layout;
+mod points;
+mod program;
+mod scene;
+
+pub use devices::{Info, Kind, devices, preferred};
+pub use error::Error;
+pub use points::Point;
+pub use scene::Scene;
+
+use device::Device;
+
+/// An open device.
+#[derive(Debug)]
+pub struct OpenCl {
+    device: Device,
+}
+
+impl OpenCl {
+    /// Opens the device of this platform and number, or the one that [`preferred`] names.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] if there is no OpenCL, [`Error::NoDevice`] if not this device.
+    pub fn open(place: Option<(usize, usize)>) -> Result<Self, Error> {
+        Ok(Self { device: Device::open(devices::choose(place)?)? })
+    }
+
+    /// What it is.
+    pub fn info(&self) -> &Info {
+        &self.device.info
+    }
+}

@@ -1,0 +1,201 @@
+//! A mesh on a device.
+
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+use super::device::{Argument, Device, Kernels, Memory};
+use super::layout::{self, Float4};
+use super::{Error, OpenCl};
+use crate::accel::{Scale, Tracer};
+use crate::geometry::{Ray, Vector};
+use crate::occlusion::sampling::sobol_matrices;
+use crate::occlusion::{Cancelled, Error as OcclusionError, Sampler, Sequence};
+use crate::progress::Progress;
+
+/// What boxes grow by on each side, in widths of the scene: so little that it only matters around 0.
+const GROWTH: f32 = 1e-30;
+/// Rays of a launch to begin with.
+const RAYS: usize = 1 << 17;
+/// The most rays of a launch.
+pub(super) const MOST_RAYS: usize = 1 << 21;
+/// Seconds that a launch may take: long enough to be worth it, short enough for watchdogs.
+const LAUNCH: f64 = 0.06;
+
+/// A mesh with its hierarchy on a device.
+#[derive(Debug)]
+pub struct Scene<'s, const D: usize> {
+    pub(super) device: &'s Device,
+    pub(super) tracer: &'s Tracer<'s, D>,
+    pub(super) scale: Scale<D>,
+    /// Whether scaled coordinates lose nothing. If they do, the device isn't asked.
+    pub(super) serves: bool,
+    /// Whether the device makes directions like the host.
+    pub(super) makes_directions: bool,
+    pub(super) on_device: Mutex<OnDevice>,
+}
+
+/// What is on the device, used by one thread at a time.
+#[derive(Debug)]
+pub(super) struct OnDevice {
+    pub kernels: Kernels,
+    pub nodes: Memory<layout::Node>,
+    pub corners: Memory<Float4>,
+    pub simplices: Memory<u32>,
+    pub matrices: Memory<u32>,
+    /// How many rays a launch takes now.
+    pub rays: usize,
+}
+
+impl OnDevice {
+    /// Takes more or fewer rays the next time, after so many took so long.
+    pub fn learn(&mut self, rays: usize, seconds: f64) {
+        let right = rays as f64 * (LAUNCH / seconds.max(1e-6)).clamp(0.25, 2.0);
+        if rays * 2 >= self.rays {
+            self.rays = (right as usize).clamp(1 << 12, MOST_RAYS);
+        }
+    }
+}
+
+pub(super) fn float4<const D: usize>(v: &Vector<D>) -> Float4 {
+    let mut all = [0.0; 4];
+    all[..D].copy_from_slice(v.as_slice());
+    Float4(all)
+}
+
+impl<'s, const D: usize> Scene<'s, D> {
+    /// Brings the mesh and its hierarchy to the device, and compiles the kernels for them.
+    ///
+    /// # Errors
+    /// [`Error`] if the device has not enough memory or the kernels don't compile.
+    pub fn new(opencl: &'s OpenCl, tracer: &'s Tracer<'s, D>) -> Result<Self, Error> {
+        let device = &opencl.device;
+        tracer.prepare();
+        let (mesh, bvh) = (tracer.mesh(), tracer.bvh());
+        let scale = Scale::of(&mesh.vertices);
+        let serves = mesh.vertices.par_iter().all(|v| is_exact(&scale, v));
+        let nodes: Vec<layout::Node> = (bvh.nodes.par_iter())
+            .map(|node| {
+                let low = scale.scaled(&node.bounds.min).map(|x| x.next_down() - GROWTH);
+                let high = scale.scaled(&node.bounds.max).map(|x| x.next_up() + GROWTH);
+                let (low, high) = (float4(&low), float4(&high));
+                layout::Node { low, high, first: node.first, count: node.count, padding: [0; 2] }
+            })
+            .collect();
+        let corners: Vec<Float4> =
+            (bvh.order.par_iter()).flat_map_iter(|&s| mesh.corners(s).map(|v| float4(&scale.scaled(&v)))).collect();
+        let kernels = device.build(D, bvh.depth())?;
+        let matrices = device.filled(&sobol_matrices(), "tables")?;
+        let makes_directions = makes_directions::<D>(device, &kernels, &matrices)?;
+        let on_device = OnDevice {
+            kernels,
+            nodes: device.filled(&nodes, "the nodes of the hierarchy")?,
+            corners: device.filled(&corners, "the corners of the simplices")?,
+            simplices: device.filled(&bvh.order, "the simplices")?,
+            matrices,
+            rays: RAYS,
+        };
+        Ok(Self { device, tracer, scale, serves, makes_directions, on_device: Mutex::new(on_device) })
+    }
+
+    /// The mesh and its hierarchy.
+    pub fn tracer(&self) -> &'s Tracer<'s, D> {
+        self.tracer
+    }
+
+    /// The device.
+    pub fn info(&self) -> &super::Info {
+        &self.device.info
+    }
+
+    /// Whether the rays of the samplers are made on the device; else they are made here and handed over.
+    pub fn makes_directions(&self) -> bool {
+        self.makes_directions
+    }
+
+    /// Whether there is nothing to hit.
+    pub(super) fn is_empty(&self) -> bool {
+        self.tracer.bvh().nodes.is_empty()
+    }
+
+    /// The simplex that each ray hits first, as [`Tracer::closest_hit`] tells; `u32::MAX` if there is none.
+    ///
+    /// # Errors
+    /// [`OcclusionError::Cancelled`] if `progress` says so, [`OcclusionError::OpenCl`] if a call fails.
+    pub fn first_hits(&self, rays: &[Ray<D>], progress: &dyn Progress) -> Result<Vec<u32>, OcclusionError> {
+        let host = |ray: &Ray<D>| self.tracer.closest_hit(ray).map_or(layout::NONE, |hit| hit.simplex);
+        if !self.serves {
+            return Ok(rays.par_iter().map(host).collect());
+        }
+        let mut found = vec![layout::NONE; rays.len()];
+        let mut on_device = self.on_device.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut begin = 0;
+        while begin < rays.len() {
+            if progress.cancelled() {
+                return Err(Cancelled.into());
+            }
+            let part = &rays[begin..rays.len().min(begin + on_device.rays)];
+            let found = &mut found[begin..begin + part.len()];
+            let start = std::time::Instant::now();
+            let origins: Vec<Float4> = part.par_iter().map(|r| float4(&self.scale.scaled(&r.origin))).collect();
+            let ways: Vec<Float4> = part.par_iter().map(|r| float4(&r.direction)).collect();
+            let origins = self.device.filled(&origins, "rays")?;
+            let ways = self.device.filled(&ways, "rays")?;
+            let out = self.device.empty::<u32>(part.len(), "results")?;
+            let state = &*on_device;
+            let arguments = [
+                state.nodes.argument(),
+                state.corners.argument(),
+                state.simplices.argument(),
+                Argument::U32(u32::from(self.is_empty())),
+                origins.argument(),
+                ways.argument(),
+                Argument::U64(part.len() as u64),
+                out.argument(),
+            ];
+            self.device.launch(&state.kernels.first_hit, &arguments, part.len())?;
+            self.device.read(&out, found)?;
+            on_device.learn(part.len(), start.elapsed().as_secs_f64());
+            found.par_iter_mut().zip(part).for_each(|(found, ray)| {
+                if *found == layout::UNSURE_SIMPLEX || !is_exact(&self.scale, &ray.origin) {
+                    *found = host(ray);
+                }
+            });
+            begin += part.len();
+        }
+        Ok(found)
+    }
+}
+
+/// Whether scaling the point loses nothing.
+pub(super) fn is_exact<const D: usize>(scale: &Scale<D>, point: &Vector<D>) -> bool {
+    let scaled = scale.scaled(point);
+    (0..D).all(|i| scaled[i].is_finite() && f64::from(scaled[i]) == f64::from(point[i]) * scale.factor)
+}
+
+/// Tries whether the device makes the host's directions, of some thousand rays.
+fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, matrices: &Memory<u32>) -> Result<bool, Error> {
+    const SITES: u64 = 64;
+    const RAYS: u32 = 128;
+    let frame = |site: u64| {
+        let normal = Vector::<D>::from_fn(|i, _| ((site * 7 + 3 * i as u64) % 11) as f32 - 4.9).normalize();
+        crate::geometry::Frame::new(&normal)
+    };
+    let sequence = |site| Sequence::new(Sampler::Sobol, 1, site);
+    let sites: Vec<layout::Site> =
+        (0..SITES).map(|site| super::points::sampled_site(&frame(site), &sequence(site), 0)).collect();
+    let count = (SITES * u64::from(RAYS)) as usize;
+    let (sites, out) = (device.filled(&sites, "points")?, device.empty::<Float4>(count, "results")?);
+    let arguments = [sites.argument(), matrices.argument(), Argument::U32(RAYS), out.argument()];
+    device.launch(&kernels.directions, &arguments, count)?;
+    let mut found = vec![Float4::default(); count];
+    device.read(&out, &mut found)?;
+    let mut found = found.iter();
+    Ok((0..SITES).all(|site| {
+        let (frame, mut sequence) = (frame(site), sequence(site));
+        (0..RAYS).all(|_| {
+            let expected = float4(&sequence.next_direction::<D>(&frame)).0.map(f32::to_bits);
+            found.next().is_some_and(|f| (0..D).all(|i| f.0[i].to_bits() == expected[i]))
+        })
+    }))
+}
