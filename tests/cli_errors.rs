@@ -350,7 +350,6 @@ fn bad_command_lines() {
         (&["run", "p.yaml", "--treads", "2"], "--threads"),
         (&["run", "p.yaml", "--threads", "0"], "expected a whole number from 1 to 1024"),
         (&["run", "p.yaml", "--backend", "cuda"], "expected cpu, opencl or opencl:PLATFORM.DEVICE"),
-        (&["run", "p.yaml", "--backend", "opencl"], "--backend opencl: not available in this version"),
         (&["check", "p.yaml", "-q", "-v"], "cannot be used with"),
         (&["compare", "a.vti"], "<B>"),
         (&["compare", "a.vti", "b.vti"], "a.vti: there is no such file"),

@@ -263,14 +263,16 @@ impl<const D: usize> Scene<'_, D> {
         found: &mut [u8],
         way: impl Fn(usize) -> Vector<D>,
     ) {
-        let mut site = None;
+        let (mut site, mut settled) = (None, 0);
         for (n, found) in found.iter_mut().enumerate() {
             if serves && matches!(*found, layout::OPEN | layout::HIT) {
                 continue;
             }
             let site = site.get_or_insert_with(|| self.site(incidence, point));
+            settled += 1;
             *found = if site.is_visible(self.tracer, way(n), limit) { layout::OPEN } else { layout::HIT };
         }
+        self.settled.fetch_add(settled, std::sync::atomic::Ordering::Relaxed);
     }
 }
 

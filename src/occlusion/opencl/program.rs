@@ -9,7 +9,8 @@ const CONE: &str = include_str!("../../../kernels/cone.cl");
 const TRACE: &str = include_str!("../../../kernels/trace.cl");
 
 /// The kernels of the program.
-pub(super) const KERNELS: [&str; 4] = ["layout", "directions", "occluded", "first_hit"];
+#[cfg(test)]
+const KERNELS: [&str; 4] = ["layout", "directions", "occluded", "first_hit"];
 
 /// The text for dimension `d`, with room for hierarchies of so many levels. In one piece, as some wrappers and drivers
 /// can't take more, and without comments, which some compilers don't take either.

@@ -1,5 +1,6 @@
 //! A mesh on a device.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -32,6 +33,8 @@ pub struct Scene<'s, const D: usize> {
     pub(super) serves: bool,
     /// Whether the device makes directions like the host.
     pub(super) makes_directions: bool,
+    /// Rays that the device left to the host.
+    pub(super) settled: AtomicU64,
     pub(super) on_device: Mutex<OnDevice>,
 }
 
@@ -95,7 +98,15 @@ impl<'s, const D: usize> Scene<'s, D> {
             matrices,
             rays: RAYS,
         };
-        Ok(Self { device, tracer, scale, serves, makes_directions, on_device: Mutex::new(on_device) })
+        Ok(Self {
+            device,
+            tracer,
+            scale,
+            serves,
+            makes_directions,
+            settled: AtomicU64::new(0),
+            on_device: Mutex::new(on_device),
+        })
     }
 
     /// The mesh and its hierarchy.
@@ -111,6 +122,11 @@ impl<'s, const D: usize> Scene<'s, D> {
     /// Whether the rays of the samplers are made on the device; else they are made here and handed over.
     pub fn makes_directions(&self) -> bool {
         self.makes_directions
+    }
+
+    /// How many rays the device couldn't decide so far, which the host did.
+    pub fn settled(&self) -> u64 {
+        self.settled.load(Ordering::Relaxed)
     }
 
     /// Whether there is nothing to hit.
@@ -159,6 +175,7 @@ impl<'s, const D: usize> Scene<'s, D> {
             found.par_iter_mut().zip(part).for_each(|(found, ray)| {
                 if *found == layout::UNSURE_SIMPLEX || !is_exact(&self.scale, &ray.origin) {
                     *found = host(ray);
+                    self.settled.fetch_add(1, Ordering::Relaxed);
                 }
             });
             begin += part.len();

@@ -1,0 +1,261 @@
+//! The same bits as on the processor.
+
+use std::path::{Path, PathBuf};
+
+use ao4d::accel::Tracer;
+use ao4d::geometry::{Ray, Vector, Vector64};
+use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::occlusion::opencl::{OpenCl, Point, Scene};
+use ao4d::occlusion::{Method, Sampler, Settings, Target};
+use ao4d::pipeline::{Backend, Pipeline, run};
+use ao4d::progress::Silent;
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+/// All files of a folder but the cache.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|path| path.file_name().is_some_and(|name| name != ".ao4d-cache.json"));
+    files.sort();
+    files.iter().map(|path| (path.file_name().unwrap().into(), std::fs::read(path).unwrap())).collect()
+}
+
+fn same_files(path: &Path, overrides: &[&str]) {
+    let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
+    let mut found = Vec::new();
+    for backend in [Backend::Cpu, Backend::OpenCl(None)] {
+        let folder = tempfile::tempdir().unwrap();
+        let pipeline = Pipeline::load(path, &overrides, Some(folder.path().to_owned())).unwrap();
+        let settings = ao4d::pipeline::Settings { backend, ..Default::default() };
+        run(&pipeline, &settings, &Silent).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        found.push(contents(folder.path()));
+    }
+    let (cpu, opencl) = (&found[0], &found[1]);
+    assert!(!cpu.is_empty() && cpu.len() == opencl.len());
+    for ((name, bytes), (_, other)) in cpu.iter().zip(opencl) {
+        assert!(bytes == other, "{}: {} differs", path.display(), name.display());
+    }
+}
+
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn every_pipeline_gives_the_same_files() {
+    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines")];
+    let mut count = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "yaml") {
+                same_files(&path, &[]);
+                count += 1;
+            }
+        }
+    }
+    assert!(count >= 10);
+}
+
+const SCENE: &str = "name: p
+seed: 3
+stages:
+  - scene:
+      DIMENSION
+      objects:
+        - cut_cube: {min: LOW, max: HIGH, cuts: [{from: FROM, to: HIGH}], subdivisions: 3}
+        - box: {min: SMALL, max: MIDDLE}
+  - occlusion: {id: ao, OCCLUSION, file: ao.f32}
+  - render: {id: image, dimensions: SIZE, SHADING, visibility: ray_cast}
+  - write: {vti: image.vti, vtu: scene.vtu, arrays: [rgba, ambient_occlusion, opacity, depth, object, normal]}
+";
+
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn methods_and_shadings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.yaml");
+    for dimension in [3, 4] {
+        let vector = |x: f64| format!("{:?}", vec![x; dimension]);
+        for (occlusion, shading) in [
+            ("samples: 100", "shading: smooth"),
+            ("method: random, samples: 70, max_distance: 0.6", "shading: voxel"),
+            ("target_error: 0.02, max_samples: 900", "shading: voxel"),
+            ("method: adaptive, samples: 64", "shading: voxel"),
+            ("method: exact", "shading: voxel"),
+            ("method: as_published, samples: 16", "shading: flat"),
+            ("samples: 1", "shading: voxel"),
+        ] {
+            let text = SCENE
+                .replace("DIMENSION", &format!("dimension: {dimension}"))
+                .replace("LOW", &vector(-0.6))
+                .replace("HIGH", &vector(0.6))
+                .replace("FROM", &vector(0.1))
+                .replace("SMALL", &vector(0.15))
+                .replace("MIDDLE", &vector(0.35))
+                .replace("SIZE", if dimension == 3 { "[24, 20]" } else { "[9, 8, 7]" })
+                .replace("OCCLUSION", occlusion)
+                .replace("SHADING", shading);
+            let eye = if dimension == 3 { "camera: {eye: [2, 1.5, 1.8]}" } else { "camera: {eye: [1, 0.8, 0.9, 2]}" };
+            std::fs::write(&path, text.replace("visibility:", &format!("{eye}, visibility:"))).unwrap();
+            same_files(&path, &[]);
+        }
+    }
+}
+
+fn vector<const D: usize>(random: &mut ChaCha8Rng, size: f64) -> Vector64<D> {
+    Vector64::from_fn(|_, _| (random.random::<f64>() - 0.5) * 2.0 * size)
+}
+
+/// Simplices anywhere; on a lattice, so that much coincides, if `step` is not 0.
+fn soup<const D: usize>(
+    random: &mut ChaCha8Rng,
+    count: usize,
+    size: f64,
+    step: f64,
+    factor: f64,
+    offset: f64,
+) -> Mesh<D> {
+    let mut surface = Surface { vertices: Vec::new(), simplices: Vec::new(), normals: None };
+    for s in 0..count as u32 {
+        let centre = vector::<D>(random, 1.0);
+        for _ in 0..D {
+            let point = centre + vector::<D>(random, size);
+            let point = if step > 0.0 { point.map(|x| (x / step).round() * step) } else { point };
+            surface.vertices.push(point.map(|x| x * factor + offset));
+        }
+        surface.simplices.push(std::array::from_fn(|i| s * D as u32 + i as u32));
+    }
+    let mut builder = MeshBuilder::new();
+    builder.add("soup", [1.0; 3], &surface, Orientation::Input).unwrap();
+    builder.finish()
+}
+
+fn soups<const D: usize>(opencl: &OpenCl) {
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    let settings = Settings { sampler: Sampler::Sobol, samples: 130, seed: 5, max_distance: f32::INFINITY };
+    let cases = [
+        (0, 0.5, 0.0, 1.0, 0.0),
+        (1, 0.5, 0.0, 1.0, 0.0),
+        (40, 0.8, 0.0, 1.0, 0.0),
+        (400, 0.2, 0.0, 1.0, 0.0),
+        (60, 0.7, 0.25, 1.0, 0.0),
+        (60, 0.7, 0.0, 1e-6, 0.0),
+        (60, 0.7, 0.0, 1e6, 0.0),
+        (60, 0.7, 0.0, 1.0, 1e5),
+        (60, 0.7, 0.0, 1e-30, 0.0),
+        (60, 0.7, 0.0, 1e25, 0.0),
+        // Some vertices vanish beside the rest when scaled.
+        (60, 0.7, 0.5, 1e27, 1e-15),
+    ];
+    for (count, size, step, factor, offset) in cases {
+        let mesh = soup::<D>(&mut random, count, size, step, factor, offset);
+        let tracer = Tracer::new(&mesh);
+        let scene = Scene::new(opencl, &tracer).unwrap();
+        let name = format!("{D}D, {count} simplices, step {step}, times {factor:e}, plus {offset:e}");
+        for (settings, target) in [
+            (settings, None),
+            (settings, Some(Target { error: 0.03 })),
+            (Settings { sampler: Sampler::Random, max_distance: 0.5 * factor as f32, ..settings }, None),
+        ] {
+            let method = Method::Sampled(settings, target);
+            let cpu = method.at_vertices(&tracer, &Silent).unwrap();
+            let device = method.at_wanted_on(&scene, None, &Silent).unwrap();
+            assert_eq!(cpu, device, "{name}");
+        }
+        let rays: Vec<Ray<D>> = (0..3000)
+            .map(|k| {
+                let origin = vector::<D>(&mut random, 2.0 * factor).map(|x| (x + offset) as f32);
+                let aim = |random: &mut ChaCha8Rng| mesh.vertices[random.random_range(0..mesh.vertices.len())];
+                let way = if k % 2 == 0 && count > 0 {
+                    (aim(&mut random) - origin).map(|x| (f64::from(x) / factor) as f32)
+                } else {
+                    vector::<D>(&mut random, 1.0).map(|x| x as f32)
+                };
+                Ray::new(origin, way)
+            })
+            .filter(|ray| ray.direction.amax() > 0.0)
+            .collect();
+        let found = scene.first_hits(&rays, &Silent).unwrap();
+        for (ray, simplex) in rays.iter().zip(found) {
+            let expected = tracer.closest_hit(ray).map_or(u32::MAX, |hit| hit.simplex);
+            assert_eq!(simplex, expected, "{name}");
+        }
+        println!("{name}: {} rays left to the host", scene.settled());
+    }
+}
+
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn random_soups_at_all_scales() {
+    let opencl = OpenCl::open(None).unwrap();
+    soups::<3>(&opencl);
+    soups::<4>(&opencl);
+}
+
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn directions_are_made_there_and_few_rays_are_left_here() {
+    let opencl = OpenCl::open(None).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let mesh = soup::<4>(&mut random, 2000, 0.1, 0.0, 1.0, 0.0);
+    let tracer = Tracer::new(&mesh);
+    let scene = Scene::new(&opencl, &tracer).unwrap();
+    assert!(scene.makes_directions());
+    let settings = Settings { sampler: Sampler::Sobol, samples: 64, seed: 5, max_distance: f32::INFINITY };
+    let points: Vec<Point<4>> = (0..8000).map(Point::Vertex).collect();
+    let first = scene.estimate(&points, &settings, None, &Silent).unwrap();
+    assert!(scene.settled() < 8000 * 64 / 100, "{} of {} rays", scene.settled(), 8000 * 64);
+    // Once more, and in another order: the same.
+    assert_eq!(first, scene.estimate(&points, &settings, None, &Silent).unwrap());
+    let back: Vec<Point<4>> = points.iter().rev().copied().collect();
+    let mut backwards = scene.estimate(&back, &settings, None, &Silent).unwrap();
+    backwards.reverse();
+    assert_eq!(first, backwards);
+}
+
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn many_runs_leave_nothing_behind() {
+    let resident = || {
+        let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+        text.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap_or(0) * 4096
+    };
+    let opencl = OpenCl::open(None).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(10);
+    let mesh = soup::<3>(&mut random, 500, 0.2, 0.0, 1.0, 0.0);
+    let tracer = Tracer::new(&mesh);
+    let scene = Scene::new(&opencl, &tracer).unwrap();
+    let settings = Settings { sampler: Sampler::Random, samples: 16, seed: 5, max_distance: f32::INFINITY };
+    let points: Vec<Point<3>> = (0..200).map(Point::Vertex).collect();
+    let run = |times: usize| (0..times).for_each(|_| drop(scene.estimate(&points, &settings, None, &Silent).unwrap()));
+    run(200);
+    let before = resident();
+    run(1000);
+    let grown = resident().saturating_sub(before);
+    assert!(grown < 20 << 20, "{grown} bytes more after a thousand runs");
+}
+
+/// Stops at once.
+struct Stop;
+
+impl ao4d::progress::Progress for Stop {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _steps: u64) {}
+    fn end(&self) {}
+    fn cancelled(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn it_can_be_stopped() {
+    let opencl = OpenCl::open(None).unwrap();
+    let mesh = soup::<4>(&mut ChaCha8Rng::seed_from_u64(1), 100, 0.2, 0.0, 1.0, 0.0);
+    let tracer = Tracer::new(&mesh);
+    let scene = Scene::new(&opencl, &tracer).unwrap();
+    let settings = Settings { sampler: Sampler::Sobol, samples: 64, seed: 5, max_distance: f32::INFINITY };
+    let stopped = Method::Sampled(settings, None).at_wanted_on(&scene, None, &Stop);
+    assert_eq!(stopped, Err(ao4d::occlusion::Error::Cancelled));
+    let ray = Ray::new(Vector::zeros(), Vector::from_element(0.5));
+    assert_eq!(scene.first_hits(&[ray], &Stop), Err(ao4d::occlusion::Error::Cancelled));
+}
