@@ -8,13 +8,15 @@
 //!
 //! The sphere of radius 1 is seen from a distance of 3, as in NTracer's scene (16 n^3 tetrahedra; 18 gives 93,312). Times
 //! are the best of some repeats: `wall` by the clock, `cpu` of all threads together, which other work on the
-//! machine disturbs less. Hierarchy and boxes are told apart; both are made once a picture.
+//! machine disturbs less. Hierarchy and boxes are told apart; both are made once a picture. Below stand rays of ambient
+//! occlusion, 64 at each vertex, in millions a second, and the share that escapes: nearly all, as of NTracer's shadow rays.
 
 use std::time::Instant;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation};
+use ao4d::occlusion::{Sampler, Settings, at_vertices};
 use ao4d::progress::Silent;
 use ao4d::render::visibility::Method;
 use ao4d::render::{Camera, Channel, NOTHING, Picture, Projection, Shading, View};
@@ -97,6 +99,17 @@ fn main() {
                     let channels = [Channel::Rgba, Channel::AmbientOcclusion, Channel::Opacity];
                     let (_, wall, cpu) = time(|| picture.slab(0..grid.dimensions[2], &channels, &Silent).expect("a picture"));
                     row("with shade", 0.0, wall, cpu, 0);
+                    let sobol = Settings { sampler: Sampler::Sobol, samples: 64, seed: 1, max_distance: f32::INFINITY };
+                    let start = Instant::now();
+                    tracer.prepare_wide();
+                    let prepare = start.elapsed().as_secs_f64();
+                    let (values, wall, cpu) = time(|| at_vertices(&tracer, &sobol, &Silent).expect("nobody cancels"));
+                    let rays = (64 * values.len()) as f64 * 1e-6;
+                    println!(
+                        "{:>10}  occlusion      {threads:>7}  {:>6.2} Mrays  {prepare:6.4}  {wall:7.4}  {cpu:7.4}   {:9.2} {:9.2}    {:.2} %",
+                        mesh.simplices.len(), rays, rays / wall, rays / cpu,
+                        100.0 * values.iter().sum::<f32>() / values.len() as f32
+                    );
                 });
             }
         }

@@ -4,6 +4,8 @@
 //! R^D is the sum over the axes of the product of its other edges ([`Aabb::half_surface`]). Nodes lie in one array;
 //! the two children of a node are neighbours, so one index names both. How it is built is in [`super::build`].
 
+use rayon::prelude::*;
+
 use super::build;
 use crate::geometry::{Aabb, Ray};
 
@@ -31,10 +33,11 @@ pub struct Bvh<const D: usize> {
 }
 
 impl<const D: usize> Bvh<D> {
-    /// Builds it over the items whose boxes these are; if `parallel` on all threads, which changes nothing else.
-    pub fn build(items: &[u32], bounds: &[Aabb<D>], parallel: bool) -> Self {
+    /// Builds it over the items, whose boxes `bounds` tells; if `parallel` on all threads, which changes nothing else.
+    pub fn build(items: &[u32], bounds: impl Fn(u32) -> Aabb<D> + Sync, parallel: bool) -> Self {
+        let item = |&index: &u32| build::Item { bounds: bounds(index), index };
         let mut items: Vec<build::Item<D>> =
-            items.iter().map(|&index| build::Item { bounds: bounds[index as usize], index }).collect();
+            if parallel { items.par_iter().map(item).collect() } else { items.iter().map(item).collect() };
         let nodes = build::tree(&mut items, parallel);
         let bvh = Self { nodes, order: items.iter().map(|item| item.index).collect() };
         debug_assert_eq!(bvh.validate(bounds), Ok(()));
@@ -117,7 +120,7 @@ impl<const D: usize> Bvh<D> {
     }
 
     /// Checks that every item is in exactly one leaf, every box within its parent's, and every node reached once.
-    pub fn validate(&self, bounds: &[Aabb<D>]) -> Result<(), String> {
+    pub fn validate(&self, bounds: impl Fn(u32) -> Aabb<D>) -> Result<(), String> {
         let mut seen = vec![false; self.order.len()];
         let mut reached = 0;
         let mut open: Vec<usize> = if self.nodes.is_empty() { vec![] } else { vec![0] };
@@ -139,7 +142,7 @@ impl<const D: usize> Bvh<D> {
                 if std::mem::replace(&mut seen[place], true) {
                     return Err(format!("place {place} is in two leaves"));
                 }
-                if !node.bounds.contains(&bounds[self.order[place] as usize]) {
+                if !node.bounds.contains(&bounds(self.order[place])) {
                     return Err(format!("item {} reaches out of its leaf {index}", self.order[place]));
                 }
             }
@@ -171,8 +174,8 @@ mod tests {
                 })
                 .collect();
             let items: Vec<u32> = (0..count as u32).collect();
-            let bvh = Bvh::build(&items, &boxes, false);
-            assert_eq!(bvh.validate(&boxes), Ok(()));
+            let bvh = Bvh::build(&items, |i| boxes[i as usize], false);
+            assert_eq!(bvh.validate(|i| boxes[i as usize]), Ok(()));
             for _ in 0..50 {
                 let ray = Ray::new(Vector::from_fn(|_, _| 2.0 * random()), Vector::from_fn(|_, _| random()));
                 let expected: Vec<u32> =
@@ -203,8 +206,8 @@ mod tests {
     fn coincident_boxes_make_a_shallow_tree() {
         let one = Aabb::<4>::of(&[Vector::from_element(1.0)]);
         let boxes = vec![one; 5000];
-        let bvh = Bvh::build(&(0..5000).collect::<Vec<u32>>(), &boxes, true);
-        assert_eq!(bvh.validate(&boxes), Ok(()));
+        let bvh = Bvh::build(&(0..5000).collect::<Vec<u32>>(), |i| boxes[i as usize], true);
+        assert_eq!(bvh.validate(|i| boxes[i as usize]), Ok(()));
     }
 
     fn threads<const D: usize>() {
@@ -217,12 +220,12 @@ mod tests {
             })
             .collect();
         let items: Vec<u32> = (0..100_000).filter(|i| i % 10 != 3).collect();
-        let one = Bvh::build(&items, &boxes, false);
-        assert_eq!(one.validate(&boxes), Ok(()));
+        let one = Bvh::build(&items, |i| boxes[i as usize], false);
+        assert_eq!(one.validate(|i| boxes[i as usize]), Ok(()));
         assert!(one.nodes.len() > 20_000);
         for threads in [1, 2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let many = pool.install(|| Bvh::build(&items, &boxes, true));
+            let many = pool.install(|| Bvh::build(&items, |i| boxes[i as usize], true));
             assert!(many == one, "{threads} threads");
         }
     }

@@ -6,8 +6,6 @@
 use std::cmp::Ordering;
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use super::{Bvh, WideBvh};
 use crate::geometry::{Aabb, Cone, Ray};
 use crate::mesh::Mesh;
@@ -72,15 +70,11 @@ impl<'m, const D: usize> Tracer<'m, D> {
     }
 
     fn build(&self, parallel: bool) -> Bvh<D> {
-        let all = 0..self.mesh.simplices.len() as u32;
-        let of = |s: u32| Aabb::of(self.mesh.corners(s).iter());
-        let bounds: Vec<Aabb<D>> =
-            if parallel { all.clone().into_par_iter().map(of).collect() } else { all.clone().map(of).collect() };
-        let mut solid: Vec<u32> = all.collect();
+        let mut solid: Vec<u32> = (0..self.mesh.simplices.len() as u32).collect();
         if !self.mesh.degenerate.is_empty() {
             solid.retain(|s| self.mesh.degenerate.binary_search(s).is_err());
         }
-        Bvh::build(&solid, &bounds, parallel)
+        Bvh::build(&solid, |s| Aabb::of(&self.mesh.corners(s)), parallel)
     }
 
     /// The same hierarchy laid out for SIMD; made when first asked for.

@@ -48,8 +48,10 @@ impl<W: Write> RawWriter<W> {
             return shape(format!("layer {first_layer}"), format!("layer {}", self.depth - self.left));
         }
         for batch in rgb.chunks(BATCH) {
-            self.bytes.clear();
-            self.bytes.extend(batch.iter().flat_map(|x| x.to_le_bytes()));
+            self.bytes.resize(size_of_val(batch), 0);
+            for (place, x) in self.bytes.chunks_exact_mut(size_of::<f32>()).zip(batch) {
+                place.copy_from_slice(&x.to_le_bytes());
+            }
             self.sink.write_all(&self.bytes)?;
         }
         self.left -= layers;

@@ -444,7 +444,7 @@ fn rate(found: &Estimates, time: Duration) -> String {
 }
 
 /// The working set of a slab: so little that memory is used again for the next, not asked for anew.
-const SLAB_BYTES: usize = 32 << 20;
+const SLAB_BYTES: usize = 16 << 20;
 
 fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Estimates>) -> Shading<'v> {
     let Some(o) = render.occlusion else { return Shading::None };

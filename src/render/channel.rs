@@ -81,7 +81,8 @@ impl Channel {
         };
         let values = match self {
             Self::Rgba => Values::U8(per_voxel(fragments, [255, 255, 255, 0], |_, f| {
-                let [r, g, b] = color(f).map(|c| (c * 255.0).round() as u8);
+                // To the nearest, exactly, as adding a half loses nothing in f64.
+                let [r, g, b] = color(f).map(|c| (f64::from(c * 255.0) + 0.5) as u8);
                 [r, g, b, 255]
             })),
             Self::Rgb => Values::F32(per_voxel(fragments, [1.0; 3], |_, f| color(f))),

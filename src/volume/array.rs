@@ -84,7 +84,16 @@ macro_rules! numbers {
             /// # Panics
             /// If the range reaches beyond the numbers, as a slice does.
             pub fn extend_le_bytes(&self, range: std::ops::Range<usize>, bytes: &mut Vec<u8>) {
-                match self { $(Values::$kind(v) => v[range].iter().for_each(|x| bytes.extend_from_slice(&x.to_le_bytes()))),+ }
+                match self {
+                    $(Values::$kind(v) => {
+                        // Room first: then this is a copy, not a push a number.
+                        let (start, numbers) = (bytes.len(), &v[range]);
+                        bytes.resize(start + size_of_val(numbers), 0);
+                        for (place, x) in bytes[start..].chunks_exact_mut(size_of::<$number>()).zip(numbers) {
+                            place.copy_from_slice(&x.to_le_bytes());
+                        }
+                    }),+
+                }
             }
 
             /// Writes number `i` as a person would read it: integers whole, floats as short as they read back.

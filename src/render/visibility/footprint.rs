@@ -159,9 +159,10 @@ impl Footprint {
     fn parallel<const D: usize>(corners: &[Vector<D>; D], along: &Vector<D>, lens: &Lens<D>) -> [Option<Self>; 2] {
         let points = corners.map(|c| widen(&c));
         let along = widen(along);
-        // det[.. point - p ..] = normal . (point - p), where the other columns are these.
+        // det[.. point - p ..] = normal . (point - p), where the other columns are these and this one is the first or the
+        // second.
         let affine = |point: &Vector64<D>, columns: &[Vector64<D>], first: usize| {
-            let normal = cross(columns) * if first % 2 == 0 { 1.0 } else { -1.0 };
+            let normal = cross(columns) * if first == 0 { 1.0 } else { -1.0 };
             let rounding = ROUNDING * columns.iter().map(norm1).product::<f64>();
             let far = point.map(f64::abs) + lens.reach;
             let bound =
@@ -172,10 +173,8 @@ impl Footprint {
         let mut columns = [Vector64::<D>::zeros(); 4];
         for m in 0..D {
             let first = usize::from(m == 0);
-            let mut n = 0;
-            for j in (0..D).filter(|&j| j != first) {
+            for (n, j) in (0..D).filter(|&j| j != first).enumerate() {
                 columns[n] = if j == m { along } else { points[j] - points[first] };
-                n += 1;
             }
             facets[m] = affine(&points[first], &columns[..D - 1], first).0;
         }

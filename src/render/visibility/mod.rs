@@ -4,7 +4,7 @@
 //!
 //! - *ray casting* takes voxel by voxel and asks the hierarchy, a time that grows with the logarithm of the number of
 //!   simplices;
-//! - *scan conversion* ([`raster`]) takes simplex by simplex and goes through the voxels it covers, rows at a time
+//! - *scan conversion* (`raster.rs`) takes simplex by simplex and goes through the voxels it covers, rows at a time
 //!   (Steiner and Burton, *Hidden Volumes: The 4th Dimension*, 1987, scan-convert tetrahedra into voxels likewise). Most
 //!   voxels then cost a few additions. It needs no hierarchy.
 //!

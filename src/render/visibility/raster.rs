@@ -243,7 +243,9 @@ impl<const D: usize> Tile<'_, D> {
             if low > bounds.1 {
                 *bounds = (low, high);
                 self.found[place + i] = simplex;
-            } else if !(high < bounds.0) {
+            } else if high < bounds.0 {
+                continue;
+            } else {
                 self.add_voxel(simplex, [i, j, k], place + i, (low, high));
             }
         }
