@@ -6,7 +6,7 @@ use std::path::Path;
 
 use ao4d::geometry::{Vector64, normal_of};
 use ao4d::mesh::Surface;
-use ao4d::mesh::topology::{corners, enclosed_volume, facet_pairs, surface_measure};
+use ao4d::mesh::topology::{corners, enclosed_volume, facet_pairs, surface_measure, worst_quality};
 use ao4d::scene::{ObjectSpec, build_object};
 use serde_json::{Value, json};
 
@@ -316,5 +316,122 @@ fn isosurfaces_are_refused_with_reasons() {
         "grid": {"min": [-1, -1, -1, -1], "max": [1, 1, 1, 1], "cells": 100}}});
     if cfg!(not(debug_assertions)) {
         assert!(refusal::<4>(noise).contains("more than 50000000 simplices"));
+    }
+}
+
+/// Distinct facets and edges.
+fn edges_and_facets(surface: &Surface<4>) -> (usize, usize) {
+    let edges = surface.simplices.iter().flat_map(|s| (0..4).flat_map(move |i| (0..i).map(move |j| (s[i], s[j]))));
+    let mut edges: Vec<(u32, u32)> = edges.map(|(a, b)| (a.min(b), a.max(b))).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    (edges.len(), facet_pairs(&surface.simplices).facets)
+}
+
+#[test]
+fn regular_polytopes() {
+    let (two, five) = (2f64.sqrt(), 5f64.sqrt());
+    for (cells, vertices, tetrahedra, area_there, volume_there) in [
+        (5, 5, 5, 5.0 * two / 12.0, five / 96.0),
+        (8, 16, 48, 8.0, 1.0),
+        (16, 8, 16, 4.0 * two / 3.0, 1.0 / 6.0),
+        (24, 24, 96, 8.0 * two, 2.0),
+        (120, 600, 3240, 30.0 * (15.0 + 7.0 * five), 15.0 * (105.0 + 47.0 * five) / 4.0),
+        (600, 120, 600, 50.0 * two, 25.0 * (2.0 + five) / 4.0),
+    ] {
+        for n in [1usize, 2, 3] {
+            let polytope = json!({"polytope": {"cells": cells, "size": 1, "subdivisions": n}});
+            let surface = build::<4>(polytope);
+            assert_closed_manifold(&surface);
+            assert_eq!(surface.simplices.len(), tetrahedra * n.pow(3));
+            // Sums of tens of thousands of terms lose a digit.
+            let tolerance = if n == 1 { 1e-12 } else { 1e-11 };
+            near(area(&surface), area_there, tolerance);
+            near(volume(&surface), volume_there, tolerance);
+            if n == 1 {
+                assert_eq!(surface.vertices.len(), vertices);
+            }
+        }
+        let unit = build::<4>(json!({"polytope": {"cells": cells}}));
+        unit.vertices.iter().for_each(|v| near(v.norm(), 1.0, 1e-14));
+    }
+    // Those of tetrahedra have no edges and triangles but their own.
+    let f_vector = |cells: u32| edges_and_facets(&build::<4>(json!({"polytope": {"cells": cells}})));
+    assert_eq!((f_vector(5), f_vector(16), f_vector(600)), ((10, 10), (24, 32), (720, 1200)));
+    assert_eq!(
+        refusal::<4>(json!({"polytope": {"cells": 7}})),
+        "polytope.cells: there is none of 7 cells; the six have 5, 8, 16, 24, 120 and 600"
+    );
+    assert!(refusal::<3>(json!({"polytope": {"cells": 8}})).contains("dimension 4, not 3"));
+    assert!(refusal::<4>(json!({"polytope": {"cells": 600, "subdivisions": 50}})).contains("75000000 simplices"));
+}
+
+#[test]
+fn hypersphere_from_the_600_cell() {
+    let sphere = |n: u32| build::<4>(json!({"hypersphere": {"radius": 1, "subdivisions": n, "from": "600-cell"}}));
+    let missing = |surface: &Surface<4>| 1.0 - volume(surface) / (PI * PI / 2.0);
+    let (one, two, four) = (sphere(1), sphere(2), sphere(4));
+    assert_eq!((two.vertices.len(), two.simplices.len()), (840, 4800));
+    assert_eq!((four.vertices.len(), four.simplices.len()), (6480, 38400));
+    for surface in [&one, &two, &four] {
+        assert_closed_manifold(surface);
+        surface.vertices.iter().for_each(|v| near(v.norm(), 1.0, 1e-14));
+    }
+    let order = missing(&two) / missing(&four);
+    assert!((3.5..4.2).contains(&order), "{order}");
+    let quality = |surface: &Surface<4>| worst_quality(corners(&surface.vertices, &surface.simplices)).unwrap().1;
+    let from_16 = build::<4>(json!({"hypersphere": {"radius": 1, "subdivisions": 13}}));
+    assert!(quality(&four) > 0.6 && quality(&four) > quality(&from_16), "{} {}", quality(&four), quality(&from_16));
+    let refused = refusal::<3>(json!({"sphere": {"radius": 1, "subdivisions": 1, "from": "600-cell"}}));
+    assert!(refused.starts_with("sphere.from"), "{refused}");
+}
+
+#[test]
+fn products() {
+    for (p, q) in [(3usize, 3usize), (3, 5), (4, 4), (6, 7)] {
+        let [a, b] = [1.0, 0.7];
+        let polygon = |n: usize, r: f64| {
+            let half = PI / n as f64;
+            (n as f64 * r * r * half.sin() * half.cos(), 2.0 * n as f64 * r * half.sin())
+        };
+        let ((area_p, rim_p), (area_q, rim_q)) = (polygon(p, a), polygon(q, b));
+        for n in [1, 2, 4] {
+            let surface = build::<4>(json!({"duoprism": {"sides": [p, q], "radii": [a, b], "subdivisions": n}}));
+            assert_closed_manifold(&surface);
+            near(volume(&surface), area_p * area_q, 1e-12);
+            near(area(&surface), rim_p * area_q + area_p * rim_q, 1e-12);
+            if n == 1 {
+                assert_eq!(surface.vertices.len(), p * q);
+                assert_eq!(surface.simplices.len(), 3 * (p * (q - 2) + q * (p - 2)));
+            }
+        }
+    }
+    for (body, area_there, volume_there) in [
+        (json!({"duocylinder": {"radii": [1, 0.5]}}), PI * PI * 1.5, PI * PI * 0.25),
+        (json!({"spherinder": {"radius": 1, "height": 2}}), 8.0 * PI + 8.0 / 3.0 * PI, 8.0 / 3.0 * PI),
+        (json!({"cubinder": {"radius": 1, "sides": [2, 2]}}), 16.0 * PI, 4.0 * PI),
+    ] {
+        let errors = [4, 8].map(|n| {
+            let mut body = body.clone();
+            body.as_object_mut().unwrap().values_mut().for_each(|spec| spec["subdivisions"] = json!(n));
+            let surface = build::<4>(body);
+            assert_closed_manifold(&surface);
+            [1.0 - area(&surface) / area_there, 1.0 - volume(&surface) / volume_there]
+        });
+        for (coarse, fine) in errors[0].into_iter().zip(errors[1]) {
+            assert!(fine > 0.0 && fine < 0.04 && (3.3..4.3).contains(&(coarse / fine)), "{body}: {coarse} {fine}");
+        }
+    }
+    for (object, message) in [
+        (json!({"duoprism": {"sides": [2, 3]}}), "duoprism.sides: 2 is not from 3 to 100000"),
+        (json!({"duocylinder": {"subdivisions": 0}}), "duocylinder.subdivisions: 0 subdivisions; the least is 1"),
+        (
+            json!({"duocylinder": {"subdivisions": 4000}}),
+            "duocylinder.subdivisions: this would make 13824000000000 simplices; one object may have 50000000 at most",
+        ),
+        (json!({"spherinder": {"radius": 1, "height": 0, "subdivisions": 2}}), "spherinder.height: 0 is not above 0"),
+        (json!({"cubinder": {"radius": 1, "sides": [1, -1], "subdivisions": 2}}), "cubinder.sides: -1 is not above 0"),
+    ] {
+        assert_eq!(refusal::<4>(object), message);
     }
 }

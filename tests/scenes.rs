@@ -324,7 +324,7 @@ fn refusals_name_key_value_and_remedy() {
     let refused = [
         (
             json!({}),
-            "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, hypersphere, sphere, isosurface",
+            "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, hypersphere, sphere, isosurface, polytope, duoprism, duocylinder, spherinder, cubinder",
         ),
         (
             json!({"tesseract": {}, "hypersphere": {"radius": 1, "subdivisions": 1}}),

@@ -12,6 +12,8 @@
 //! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`] |
 //! | `cut_cube` | a box minus boxes | [`lattice`] |
 //! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
+//! | `polytope` | one of the six regular polytopes | - |
+//! | `duoprism`, `duocylinder`, `spherinder`, `cubinder` | boundary of a product of two solids | [`product`] |
 //! | `isosurface` | where a formula or a grid of values passes a value | [`isosurface`] |
 //!
 //! [`build_object`] checks everything that can be wrong with an object, so whoever checks a pipeline builds its scene.
@@ -19,6 +21,7 @@
 mod color;
 mod cuboid;
 mod cut_cube;
+mod disc;
 mod error;
 mod extrude;
 mod file;
@@ -27,7 +30,9 @@ pub mod isosurface;
 pub mod lattice;
 mod numbers;
 mod object;
+pub mod polytope;
 pub mod product;
+mod products;
 pub mod readers;
 mod simplices;
 mod transform;
@@ -38,9 +43,11 @@ pub use cuboid::{BoxSpec, TesseractSpec};
 pub use cut_cube::{CutCubeSpec, CutSpec};
 pub use error::Error;
 pub use extrude::ExtrudeSpec;
-pub use hypersphere::SphereSpec;
+pub use hypersphere::{Base, SphereSpec};
 pub use isosurface::IsosurfaceSpec;
 pub use numbers::{MAX_SIMPLICES, OneOrEach};
 pub use object::{ObjectSpec, Orientation, Shape, build_object};
+pub use polytope::PolytopeSpec;
+pub use products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 pub use simplices::SimplicesSpec;
 pub use transform::{RotateSpec, TransformStep};

@@ -12,6 +12,8 @@ use super::extrude::ExtrudeSpec;
 use super::hypersphere::SphereSpec;
 use super::isosurface::IsosurfaceSpec;
 use super::numbers::AXES;
+use super::polytope::PolytopeSpec;
+use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
@@ -51,6 +53,21 @@ pub struct ObjectSpec {
     /// Shape: where a field, given by a formula or by a grid of values, passes a value.
     #[serde(default)]
     pub isosurface: Option<IsosurfaceSpec>,
+    /// Shape: a regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell.
+    #[serde(default)]
+    pub polytope: Option<PolytopeSpec>,
+    /// Shape: the product of two regular polygons.
+    #[serde(default)]
+    pub duoprism: Option<DuoprismSpec>,
+    /// Shape: the product of two discs.
+    #[serde(default)]
+    pub duocylinder: Option<DuocylinderSpec>,
+    /// Shape: the product of a ball and an interval.
+    #[serde(default)]
+    pub spherinder: Option<SpherinderSpec>,
+    /// Shape: the product of a disc and a rectangle.
+    #[serde(default)]
+    pub cubinder: Option<CubinderSpec>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -94,6 +111,16 @@ pub enum Shape<'a> {
     Sphere(&'a SphereSpec),
     /// Where a field passes a value.
     Isosurface(&'a IsosurfaceSpec),
+    /// A regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell.
+    Polytope(&'a PolytopeSpec),
+    /// The product of two regular polygons.
+    Duoprism(&'a DuoprismSpec),
+    /// The product of two discs.
+    Duocylinder(&'a DuocylinderSpec),
+    /// The product of a ball and an interval.
+    Spherinder(&'a SpherinderSpec),
+    /// The product of a disc and a rectangle.
+    Cubinder(&'a CubinderSpec),
 }
 
 impl Shape<'_> {
@@ -109,15 +136,21 @@ impl Shape<'_> {
             Shape::Hypersphere(_) => "hypersphere",
             Shape::Sphere(_) => "sphere",
             Shape::Isosurface(_) => "isosurface",
+            Shape::Polytope(_) => "polytope",
+            Shape::Duoprism(_) => "duoprism",
+            Shape::Duocylinder(_) => "duocylinder",
+            Shape::Spherinder(_) => "spherinder",
+            Shape::Cubinder(_) => "cubinder",
         }
     }
 
-    /// The file it is read from, as the pipeline names it.
-    pub fn input_file(&self) -> Option<&Path> {
+    /// The files it is read from, as the pipeline names them.
+    pub fn input_files(&self) -> Vec<&Path> {
         match self {
-            Shape::File(path) => Some(path),
-            Shape::Extrude(spec) => Some(&spec.mesh),
-            _ => None,
+            Shape::File(path) => vec![path],
+            Shape::Extrude(spec) => vec![&spec.mesh],
+            Shape::Isosurface(spec) => spec.input_files(),
+            _ => Vec::new(),
         }
     }
 
@@ -135,7 +168,12 @@ impl Shape<'_> {
                 Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
             }
             Shape::Sphere(spec) => spec.build("sphere"),
-            Shape::Isosurface(spec) => spec.build(),
+            Shape::Isosurface(spec) => spec.build(folder),
+            Shape::Polytope(spec) => spec.build(),
+            Shape::Duoprism(spec) => spec.build(),
+            Shape::Duocylinder(spec) => spec.build(),
+            Shape::Spherinder(spec) => spec.build(),
+            Shape::Cubinder(spec) => spec.build(),
         }
     }
 }
@@ -153,6 +191,11 @@ impl ObjectSpec {
             self.hypersphere.as_ref().map(Shape::Hypersphere),
             self.sphere.as_ref().map(Shape::Sphere),
             self.isosurface.as_ref().map(Shape::Isosurface),
+            self.polytope.as_ref().map(Shape::Polytope),
+            self.duoprism.as_ref().map(Shape::Duoprism),
+            self.duocylinder.as_ref().map(Shape::Duocylinder),
+            self.spherinder.as_ref().map(Shape::Spherinder),
+            self.cubinder.as_ref().map(Shape::Cubinder),
         ];
         let mut given = shapes.into_iter().flatten();
         match (given.next(), given.next()) {
@@ -164,7 +207,7 @@ impl ObjectSpec {
             _ => Err(Error::invalid(
                 "",
                 "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, \
-                 hypersphere, sphere, isosurface",
+                 hypersphere, sphere, isosurface, polytope, duoprism, duocylinder, spherinder, cubinder",
             )),
         }
     }

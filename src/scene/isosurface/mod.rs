@@ -1,7 +1,7 @@
 //! Isosurfaces: where a field, given by a formula or as a grid of values, passes a value.
 //!
 //! [`table`] says what the surface is within one cell of a grid, [`march`] goes over all cells, [`field`] and `expression`
-//! make fields of formulas. For D = 4 that is marching hypercubes, for D = 3 marching cubes. The surface
+//! make fields of formulas, [`image`] of files. For D = 4 that is marching hypercubes, for D = 3 marching cubes. The surface
 //! is piecewise linear and converges with the square of the cells' size. Around the grid is nothing, if `pad` is not
 //! switched off, so that a body that reaches beyond the grid is cut off flat there, a fiftieth of a cell outside of it, and
 //! the surface is closed in any case.
@@ -9,8 +9,11 @@
 mod components;
 mod expression;
 pub mod field;
+pub mod image;
 pub mod march;
 pub mod table;
+
+use std::path::Path;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -18,10 +21,11 @@ use serde::{Deserialize, Serialize};
 
 use self::expression::{Expression, Rows};
 use self::field::Field;
+use self::image::ImageSpec;
 use self::march::{Layers, Stop};
 use super::Error;
 use super::lattice::divide;
-use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, check_count, finite};
+use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, finite};
 use crate::mesh::Surface;
 
 /// The most points a layer of a grid may have: three layers are held in memory.
@@ -36,12 +40,13 @@ const MOST_POINTS: u128 = 1 << 33;
 pub struct IsosurfaceSpec {
     /// The field.
     pub field: Field,
-    /// Where the field is looked at.
-    pub grid: GridSpec,
-    /// The value that the surface is at; 0 if left out.
+    /// Where a formula is looked at. An image brings its own grid.
+    #[serde(default)]
+    pub grid: Option<GridSpec>,
+    /// The value that the surface is at; 0 if left out. An image needs one.
     #[serde(default)]
     pub isovalue: Option<f64>,
-    /// Which side of the isovalue is solid; `below` if left out.
+    /// Which side of the isovalue is solid; if left out `below` for formulas and `above` for images.
     #[serde(default)]
     pub inside: Option<Side>,
     /// Whether to close the surface where it leaves the grid; yes if left out.
@@ -81,17 +86,58 @@ pub struct GridSpec {
 }
 
 impl IsosurfaceSpec {
-    /// The surface.
-    pub fn build<const D: usize>(&self) -> Result<Surface<D>, Error> {
+    /// The files it is read from, as the pipeline names them.
+    pub fn input_files(&self) -> Vec<&Path> {
+        match &self.field {
+            Field::Image(image) => image.files().collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The surface. Files are relative to `folder`.
+    pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
+        match &self.field {
+            Field::Image(image) => self.of_image(image, folder),
+            _ => self.of_formula(),
+        }
+    }
+
+    fn of_image<const D: usize>(&self, image: &ImageSpec, folder: &Path) -> Result<Surface<D>, Error> {
+        if self.grid.is_some() {
+            let message = "an image has a grid of its own; place it by spacing and origin, or take a part by crop";
+            return Err(Error::invalid("isosurface.grid", message));
+        }
+        let Some(isovalue) = self.isovalue else {
+            return Err(Error::invalid("isosurface", "an image needs an isovalue: the value that the surface is at"));
+        };
+        let isovalue = finite("isosurface.isovalue", isovalue)?;
+        let (mut layers, axes) = image.open::<D>(folder, isovalue, self.inside.unwrap_or(Side::Above))?;
+        check_grid("isosurface.field.image", &axes.each_ref().map(|axis| axis.len() as u128))?;
+        if let Some(axis) = axes.iter().position(|axis| axis.len() < 2).filter(|_| !self.pad) {
+            let message = format!("the image has one point along {}; it needs two, or pad: true", AXES[axis]);
+            return Err(Error::invalid("isosurface.pad", message));
+        }
+        let backwards = axes.iter().filter(|axis| axis.len() > 1 && axis[1] < axis[0]).count();
+        let mut surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut layers);
+        if let (Ok(surface), 1) = (&mut surface, backwards % 2) {
+            surface.simplices.iter_mut().for_each(|simplex| simplex.swap(D - 2, D - 1));
+        }
+        finish(surface, &layers.seen, isovalue, self.smallest_component)
+    }
+
+    fn of_formula<const D: usize>(&self) -> Result<Surface<D>, Error> {
         let isovalue = finite("isosurface.isovalue", self.isovalue.unwrap_or(0.0))?;
         let inside = self.inside.unwrap_or(Side::Below);
         let definition = self.field.define(D)?;
         let formula_key = format!("isosurface.field.{}", self.field.key());
         let expression = Expression::parse(&definition.formula, &AXES[..D])
             .map_err(|message| Error::invalid(&formula_key, message))?;
+        let Some(grid) = &self.grid else {
+            return Err(Error::invalid("isosurface", "a formula needs a grid to be looked at on: give grid"));
+        };
         // A body grows by the isovalue, as its field is a distance.
         let reach = definition.extent.map(|extent| extent.map(|x| x + isovalue.max(0.0)));
-        let axes = self.grid.axes::<D>(reach)?;
+        let axes = grid.axes::<D>(reach)?;
         let mut sampled = Sampled {
             rows: expression.along(&axes[0]),
             axes: axes.clone(),
@@ -178,7 +224,7 @@ fn check_grid<const D: usize>(key: &str, points: &[u128; D]) -> Result<(), Error
         );
         return Err(Error::invalid(key, message));
     }
-    check_count(key, 0)
+    Ok(())
 }
 
 /// What was met of a field.
@@ -212,10 +258,23 @@ impl Seen {
         self.lowest = self.lowest.min(value);
         self.highest = self.highest.max(value);
         let depth = (sign * (value - isovalue)) as f32;
+        self.count(depth);
+        depth
+    }
+
+    /// Notes how far a value is inside.
+    fn look_at_depth(&mut self, depth: f32, isovalue: f64, sign: f64) {
+        let value = isovalue + sign * f64::from(depth);
+        self.lowest = self.lowest.min(value);
+        self.highest = self.highest.max(value);
+        self.count(depth);
+    }
+
+    #[inline]
+    fn count(&mut self, depth: f32) {
         let inside = depth >= 0.0;
         self.inside += u64::from(inside);
         self.outside += u64::from(!inside);
-        depth
     }
 }
 

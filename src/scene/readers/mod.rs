@@ -1,9 +1,10 @@
-//! Meshes from files: triangles from `.stl` and `.ply`, triangles or tetrahedra from `.vtu`.
+//! Meshes from files: triangles from `.stl` and `.ply`, triangles or tetrahedra from `.vtu`. And [`image`]s.
 //!
 //! A file is read whole, so that declared sizes can be held against its length before anything is allocated. Whatever
 //! it holds, the answer is a mesh whose indices are within range and whose coordinates are finite, or an error that
 //! names the file and what is wrong with it. Orientation is that of the vertices' order; normals of STL files are ignored.
 
+pub mod image;
 mod ply;
 mod stl;
 mod vtu;
