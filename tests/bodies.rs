@@ -18,6 +18,12 @@ fn build<const D: usize>(object: Value) -> Surface<D> {
     build_object(&spec(object.clone()), Path::new(".")).unwrap_or_else(|error| panic!("{object}: {error}"))
 }
 
+/// With the meshes that ship with the program.
+fn build_of_mesh<const D: usize>(object: Value) -> Surface<D> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/meshes");
+    build_object(&spec(object.clone()), &folder).unwrap_or_else(|error| panic!("{object}: {error}"))
+}
+
 fn refusal<const D: usize>(object: Value) -> String {
     build_object::<D>(&spec(object.clone()), Path::new(".")).expect_err(&object.to_string()).to_string()
 }
@@ -433,5 +439,143 @@ fn products() {
         (json!({"cubinder": {"radius": 1, "sides": [1, -1], "subdivisions": 2}}), "cubinder.sides: -1 is not above 0"),
     ] {
         assert_eq!(refusal::<4>(object), message);
+    }
+}
+
+#[test]
+fn moving_bodies() {
+    let swept = |layers: u32, motion: Value| {
+        let object = json!({"extrude": {"mesh": "nut.vtu", "from": -1, "to": 2, "layers": layers, "motion": motion}});
+        let surface = build_of_mesh::<4>(object);
+        assert_closed_manifold(&surface);
+        surface
+    };
+    let still = swept(1, json!([]));
+    let solid = volume(&still) / 3.0;
+    // Moving is a shear; scaling by s over the sweep gives a frustum: both are exact with any layers.
+    for layers in [1, 4] {
+        near(volume(&swept(layers, json!([{"translate": [30, -10, 5]}]))), 3.0 * solid, 1e-12);
+        let frustum = 3.0 * solid * (1.0 + 0.5 + 0.25 + 0.125) / 4.0;
+        near(volume(&swept(layers, json!([{"scale": 0.5}]))), frustum, if layers == 1 { 0.05 } else { 0.005 });
+    }
+    assert!(still.simplices == swept(1, json!([{"scale": [1, 1, 2]}])).simplices);
+    // Turning loses volume between layers, with the square of their distance.
+    let missing = |layers: u32| {
+        let turn = json!([{"rotate": {"plane": "xy", "degrees": 60, "center": [81, -82, -81]}}]);
+        1.0 - volume(&swept(layers, turn)) / (3.0 * solid)
+    };
+    let (coarse, fine) = (missing(8), missing(16));
+    assert!(fine.abs() < 0.01 && (3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
+    let first = |surface: &Surface<4>| surface.vertices.iter().filter(|v| v[3] == -1.0).copied().collect::<Vec<_>>();
+    assert_eq!(first(&still), first(&swept(3, json!([{"scale": 2}, {"translate": [1, 2, 3]}]))));
+    for (motion, message) in [
+        (json!([{"scale": -1}]), "extrude.motion.0.scale: -1 is not above 0"),
+        (
+            json!([{"translate": [1, 2, 3]}, {"rotate": {"plane": "xw", "degrees": 1}}]),
+            "extrude.motion.1.rotate.plane: ",
+        ),
+        (json!([{"translate": [1, 2, 3, 4]}]), "extrude.motion.0.translate: expected 3 numbers"),
+    ] {
+        let found = refusal::<4>(json!({"extrude": {"mesh": "nut.vtu", "from": 0, "to": 1, "motion": motion}}));
+        assert!(found.starts_with(message), "{found}");
+    }
+}
+
+#[test]
+fn bodies_of_revolution() {
+    // Pappus: the volume is that of the mesh times the way of its middle.
+    let ant = build_of_mesh::<3>(json!({"file": "ant.ply"}));
+    let offset = 20.0;
+    let moment: f64 = corners(&ant.vertices, &ant.simplices)
+        .map(|t| ao4d::geometry::determinant(&t) / 6.0 * (t[0][1] + t[1][1] + t[2][1]) / 4.0)
+        .sum();
+    let expected = 2.0 * PI * (moment + offset * volume(&ant));
+    let missing = [40, 80].map(|steps| {
+        let spun = json!({"spin": {"mesh": "ant.ply", "plane": "yw", "offset": offset, "steps": steps}});
+        let surface = build_of_mesh::<4>(spun);
+        assert_closed_manifold(&surface);
+        assert_eq!((surface.vertices.len(), surface.simplices.len()), (486 * steps, 912 * 3 * steps));
+        1.0 - volume(&surface) / expected
+    });
+    assert!(missing[1] > 0.0 && missing[1] < 0.003 && (3.5..4.5).contains(&(missing[0] / missing[1])), "{missing:?}");
+    // Half a ball on the axis becomes a hypersphere: what is on the axis collapses, and the rest is closed.
+    let folder = tempfile::tempdir().unwrap();
+    let half = build::<3>(json!({"isosurface": {
+        "field": {"formula": "sqrt(x^2 + y^2 + z^2) - 1"}, "pad": false,
+        "grid": {"min": [0, -1.2, -1.2], "max": [1.2, 1.2, 1.2], "cells": [12, 24, 24]},
+    }}));
+    let mut obj = String::from("# half a ball\no half\n");
+    half.vertices.iter().for_each(|v| obj += &format!("v {} {} {}\n", v[0], v[1], v[2]));
+    half.simplices.iter().for_each(|t| obj += &format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    std::fs::write(folder.path().join("half.obj"), obj).unwrap();
+    let spun = spec(json!({"spin": {"mesh": "half.obj", "steps": 48}}));
+    let sphere = build_object::<4>(&spun, folder.path()).unwrap();
+    assert_closed_manifold(&sphere);
+    near(volume(&sphere), PI * PI / 2.0, 0.02);
+    let negative =
+        build_object::<4>(&spec(json!({"spin": {"mesh": "half.obj", "plane": "yw", "steps": 8}})), folder.path());
+    assert!(negative.unwrap_err().to_string().starts_with("spin.offset: a point has y = -"));
+    for (key, value, message) in [
+        ("plane", json!("xy"), "spin.plane: \"xy\" is none of xw, yw and zw"),
+        ("steps", json!(2), "spin.steps: 2 steps; the least is 3"),
+    ] {
+        let mut object = json!({"spin": {"mesh": "half.obj", "steps": 8}});
+        object["spin"][key] = value;
+        assert_eq!(build_object::<4>(&spec(object), folder.path()).unwrap_err().to_string(), message);
+    }
+}
+
+#[test]
+fn meshes_from_obj_and_msh() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let extruded =
+        |name: &str| build_object::<4>(&spec(json!({"extrude": {"mesh": name, "from": 0, "to": 2}})), folder.path());
+    // The corner simplex, of volume 1/6, its nodes with tags out of order.
+    let nodes = "7 0 0 0\n3 1 0 0\n12 0 1 0\n5 0 0 1\n";
+    let elements = "1 15 2 0 1 7\n2 2 2 0 1 7 3 12\n9 4 2 0 1 7 3 12 5\n";
+    let second = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{nodes}$EndNodes\n$Elements\n3\n{elements}$EndElements\n"
+    );
+    write("two.msh", &second);
+    let fourth = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 0 0\n$EndEntities\n\
+        $Nodes\n2 4 3 12\n0 1 0 1\n7\n0 0 0\n3 1 0 3\n3\n12\n5\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n\
+        $Elements\n2 2 1 9\n0 1 15 1\n1 7\n3 1 4 1\n9 7 3 12 5\n$EndElements\n";
+    write("four.msh", fourth);
+    for name in ["two.msh", "four.msh"] {
+        let surface = extruded(name).unwrap();
+        assert_closed_manifold(&surface);
+        near(volume(&surface), 2.0 / 6.0, 1e-14);
+    }
+    // A cube of quadrilaterals, in two objects that share points; negative indices, slashes.
+    write(
+        "cube.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvn 0 0 1\no a\nf 4 3 2 1\nf 5 6 7 8\n\
+         f 1//1 2//1 6//1 5//1\no b\nf 3 4 8 7\nf -8 -4 -1 -5\nf 2 3 7 6\n",
+    );
+    let cube = build_object::<3>(&spec(json!({"file": "cube.obj"})), folder.path()).unwrap();
+    assert_closed_manifold(&cube);
+    assert_eq!((cube.vertices.len(), cube.simplices.len()), (8, 12));
+    near(volume(&cube), 1.0, 1e-15);
+    write("bad.obj", "v 0 0 0\nf 1 2 3\n");
+    write("words.obj", "v 0 0 x\nf 1 1 1\n");
+    write("quads.msh", &second.replace("9 4 2 0 1 7 3 12 5", "9 5 2 0 1 7 3 12 5 7 3 12 5"));
+    write("gap.msh", &second.replace("7 3 12 5\n", "7 3 12 6\n"));
+    write("binary.msh", "$MeshFormat\n4.1 1 8\n");
+    write("old.msh", "$MeshFormat\n1 0 8\n");
+    write("cut.msh", &fourth[..fourth.len() - 30]);
+    write("none.msh", "hello");
+    for (name, message) in [
+        ("bad.obj", "is damaged, or no OBJ file"),
+        ("words.obj", "is damaged, or no OBJ file"),
+        ("quads.msh", "holds 1 solid elements that are no tetrahedra"),
+        ("gap.msh", "has an element with node 6, which is not there"),
+        ("binary.msh", "is binary; save it as text"),
+        ("old.msh", "is of version 1; 2.2 and 4.1"),
+        ("cut.msh", "is cut off"),
+        ("none.msh", "has no $MeshFormat"),
+    ] {
+        let found = extruded(name).unwrap_err().to_string();
+        assert!(found.contains(message) && found.contains(name), "{found}");
     }
 }

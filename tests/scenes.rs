@@ -324,7 +324,7 @@ fn refusals_name_key_value_and_remedy() {
     let refused = [
         (
             json!({}),
-            "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, hypersphere, sphere, isosurface, polytope, duoprism, duocylinder, spherinder, cubinder",
+            "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, hypersphere, sphere, isosurface, spin, polytope, duoprism, duocylinder, spherinder, cubinder",
         ),
         (
             json!({"tesseract": {}, "hypersphere": {"radius": 1, "subdivisions": 1}}),
@@ -716,7 +716,8 @@ fn damaged_files_are_refused_by_name() {
         std::fs::create_dir(folder.0.path().join(format!("folder.{ending}"))).unwrap();
         assert!(folder.read::<3>(&format!("folder.{ending}")).unwrap_err().contains("can't read"));
     }
-    refused("mesh.obj", b"v 0 0 0", "the name must end in .stl, .ply or .vtu");
+    refused("mesh.obj", b"v 0 0 0", "holds no triangle");
+    refused("mesh.off", b"OFF", "the name must end in .stl, .obj, .ply, .msh or .vtu");
     refused("no-name", b"v 0 0 0", "the name must end in .stl, .ply or .vtu");
     refused("cut.stl", &binary_stl("x")[..100], "it declares 4 triangles, which take 284 bytes, and has 100");
     refused("none.stl", ascii_stl("", &[]).as_bytes(), "holds no triangle");

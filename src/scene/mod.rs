@@ -12,6 +12,7 @@
 //! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`] |
 //! | `cut_cube` | a box minus boxes | [`lattice`] |
 //! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
+//! | `spin` | a 3D mesh turned round in a plane with w | [`readers`], [`product`] |
 //! | `polytope` | one of the six regular polytopes | - |
 //! | `duoprism`, `duocylinder`, `spherinder`, `cubinder` | boundary of a product of two solids | [`product`] |
 //! | `isosurface` | where a formula or a grid of values passes a value | [`isosurface`] |
@@ -35,6 +36,7 @@ pub mod product;
 mod products;
 pub mod readers;
 mod simplices;
+mod spin;
 mod transform;
 mod weld;
 
@@ -50,4 +52,5 @@ pub use object::{ObjectSpec, Orientation, Shape, build_object};
 pub use polytope::PolytopeSpec;
 pub use products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 pub use simplices::SimplicesSpec;
+pub use spin::SpinSpec;
 pub use transform::{RotateSpec, TransformStep};

@@ -15,6 +15,7 @@ use super::numbers::AXES;
 use super::polytope::PolytopeSpec;
 use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
+use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
 use crate::mesh::Surface;
@@ -29,7 +30,8 @@ pub struct ObjectSpec {
     /// Shape: vertices and simplices listed here.
     #[serde(default)]
     pub simplices: Option<SimplicesSpec>,
-    /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.ply`, `.vtu` in 3D.
+    /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.obj`, `.ply`,
+    /// `.msh`, `.vtu` in 3D.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// Shape: a three-dimensional mesh swept along the fourth axis.
@@ -53,6 +55,9 @@ pub struct ObjectSpec {
     /// Shape: where a field, given by a formula or by a grid of values, passes a value.
     #[serde(default)]
     pub isosurface: Option<IsosurfaceSpec>,
+    /// Shape: a three-dimensional mesh turned round in a plane with w.
+    #[serde(default)]
+    pub spin: Option<SpinSpec>,
     /// Shape: a regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell.
     #[serde(default)]
     pub polytope: Option<PolytopeSpec>,
@@ -111,6 +116,8 @@ pub enum Shape<'a> {
     Sphere(&'a SphereSpec),
     /// Where a field passes a value.
     Isosurface(&'a IsosurfaceSpec),
+    /// A three-dimensional mesh turned round in a plane with w.
+    Spin(&'a SpinSpec),
     /// A regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell.
     Polytope(&'a PolytopeSpec),
     /// The product of two regular polygons.
@@ -136,6 +143,7 @@ impl Shape<'_> {
             Shape::Hypersphere(_) => "hypersphere",
             Shape::Sphere(_) => "sphere",
             Shape::Isosurface(_) => "isosurface",
+            Shape::Spin(_) => "spin",
             Shape::Polytope(_) => "polytope",
             Shape::Duoprism(_) => "duoprism",
             Shape::Duocylinder(_) => "duocylinder",
@@ -149,6 +157,7 @@ impl Shape<'_> {
         match self {
             Shape::File(path) => vec![path],
             Shape::Extrude(spec) => vec![&spec.mesh],
+            Shape::Spin(spec) => vec![&spec.mesh],
             Shape::Isosurface(spec) => spec.input_files(),
             _ => Vec::new(),
         }
@@ -169,6 +178,7 @@ impl Shape<'_> {
             }
             Shape::Sphere(spec) => spec.build("sphere"),
             Shape::Isosurface(spec) => spec.build(folder),
+            Shape::Spin(spec) => spec.build(folder),
             Shape::Polytope(spec) => spec.build(),
             Shape::Duoprism(spec) => spec.build(),
             Shape::Duocylinder(spec) => spec.build(),
@@ -191,6 +201,7 @@ impl ObjectSpec {
             self.hypersphere.as_ref().map(Shape::Hypersphere),
             self.sphere.as_ref().map(Shape::Sphere),
             self.isosurface.as_ref().map(Shape::Isosurface),
+            self.spin.as_ref().map(Shape::Spin),
             self.polytope.as_ref().map(Shape::Polytope),
             self.duoprism.as_ref().map(Shape::Duoprism),
             self.duocylinder.as_ref().map(Shape::Duocylinder),
@@ -207,7 +218,7 @@ impl ObjectSpec {
             _ => Err(Error::invalid(
                 "",
                 "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, \
-                 hypersphere, sphere, isosurface, polytope, duoprism, duocylinder, spherinder, cubinder",
+                 hypersphere, sphere, isosurface, spin, polytope, duoprism, duocylinder, spherinder, cubinder",
             )),
         }
     }
@@ -218,7 +229,7 @@ pub fn build_object<const D: usize>(spec: &ObjectSpec, folder: &Path) -> Result<
     let shape = spec.shape()?;
     spec.color.rgb()?;
     let mut surface = shape.build::<D>(folder)?;
-    transform::apply(&spec.transform, &mut surface)?;
+    transform::apply("transform", &spec.transform, &mut surface)?;
     // Coordinates are rounded to single precision afterwards and must survive that.
     let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);
     if let Some((i, vertex)) = surface.vertices.iter().enumerate().find(|(_, vertex)| vertex.iter().any(too_large)) {

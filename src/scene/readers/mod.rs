@@ -1,10 +1,12 @@
-//! Meshes from files: triangles from `.stl` and `.ply`, triangles or tetrahedra from `.vtu`. And [`image`]s.
+//! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu` and `.msh`. And [`image`]s.
 //!
 //! A file is read whole, so that declared sizes can be held against its length before anything is allocated. Whatever
 //! it holds, the answer is a mesh whose indices are within range and whose coordinates are finite, or an error that
 //! names the file and what is wrong with it. Orientation is that of the vertices' order; normals of STL files are ignored.
 
 pub mod image;
+mod msh;
+mod obj;
 mod ply;
 mod stl;
 mod vtu;
@@ -93,7 +95,11 @@ impl Input {
             "stl" => stl::read,
             "ply" => ply::read,
             "vtu" => vtu::read,
-            _ => return Err(self.wrong("can't tell what it holds; the name must end in .stl, .ply or .vtu")),
+            "obj" => obj::read,
+            "msh" => msh::read,
+            _ => {
+                return Err(self.wrong("can't tell what it holds; the name must end in .stl, .obj, .ply, .msh or .vtu"));
+            }
         };
         let bytes = std::fs::read(&self.path).map_err(|source| self.unreadable(source))?;
         if bytes.is_empty() {
