@@ -6,7 +6,7 @@ use std::path::Path;
 use ao4d::geometry::normal_of;
 use ao4d::mesh::Surface;
 use ao4d::mesh::topology::{corners, enclosed_volume, facet_pairs};
-use ao4d::scene::{ObjectSpec, build_object};
+use ao4d::scene::{ObjectSpec, build_object, build_object_with_notes};
 use serde_json::{Value, json};
 
 fn try_build<const D: usize>(folder: &Path, image: Value, isovalue: f64) -> Result<Surface<D>, String> {
@@ -245,6 +245,120 @@ fn values_that_are_no_numbers_are_outside() {
     assert!((found - hole).abs() < 1e-6, "{found} {hole}");
 }
 
+/// The surface, and what is told of it.
+fn build_with_notes(folder: &Path, isosurface: Value) -> (Surface<4>, Vec<String>) {
+    let spec: ObjectSpec = serde_json::from_value(json!({"isosurface": isosurface})).unwrap();
+    let mut notes = Vec::new();
+    let surface = build_object_with_notes(&spec, folder, &mut notes).unwrap_or_else(|e| panic!("{isosurface}: {e}"));
+    (surface, notes)
+}
+
+#[test]
+fn values_that_are_no_numbers_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut values: Vec<f32> = ball().into_iter().map(f32::from).collect();
+    values[6 + 13 * (6 + 12 * (5 + 11 * 5))] = f32::NAN;
+    values[0] = f32::NAN;
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    std::fs::write(folder.path().join("holed.raw"), bytes).unwrap();
+    let mut image = json!({"file": "holed.raw", "dimensions": POINTS, "type": "float32"});
+    let notes =
+        |image: &Value| build_with_notes(folder.path(), json!({"field": {"image": image}, "isovalue": ISOVALUE})).1;
+    assert_eq!(notes(&image), ["isosurface.field: 2 of 17160 values are no numbers; they count as outside"]);
+    image["downsample"] = json!([2, 2, 1, 2]);
+    assert_eq!(notes(&image), ["isosurface.field: 2 of 15840 values are no numbers; they count as outside"]);
+    image["crop"] = json!({"from": [1, 0, 0, 0], "to": [13, 12, 11, 10]});
+    image["downsample"] = json!(1);
+    assert_eq!(notes(&image), ["isosurface.field: 1 of 15840 values are no numbers; they count as outside"]);
+    let grid = json!({"min": [-1, -1, -1, -1], "max": [1, 1, 1, 1], "cells": 4});
+    let (half, notes) =
+        build_with_notes(folder.path(), json!({"field": {"formula": "sqrt(x) - 2"}, "isovalue": 0, "grid": grid}));
+    assert_eq!(notes, ["isosurface.field: 250 of 625 values are no numbers; they count as outside"]);
+    assert!(half.vertices.iter().all(|v| v[0] > -0.5) && facet_pairs(&half.simplices).is_manifold());
+}
+
+#[test]
+fn an_isovalue_beyond_all_values_gives_nothing_and_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("ball.raw"), little(&ball())).unwrap();
+    let build = |isovalue: f64, pad: bool| {
+        let field = json!({"image": raw_image("ball.raw")});
+        build_with_notes(folder.path(), json!({"field": field, "isovalue": isovalue, "pad": pad}))
+    };
+    let highest = ball().into_iter().max().unwrap();
+    let range = format!("its values go from 0 to {highest}");
+    let (nothing, notes) = build(5000.0, true);
+    assert!(nothing == Surface::default());
+    let told = "isosurface.isovalue: the field is outside everywhere";
+    assert_eq!(notes, [format!("{told}: {range}, and the isovalue is 5000; there is no surface")]);
+    let told = "isosurface.isovalue: the field is inside everywhere";
+    let (border, notes) = build(-1.0, true);
+    assert!(facet_pairs(&border.simplices).is_manifold() && facet_pairs(&border.simplices).is_closed());
+    assert!((volume(&border) / (12.0 * 11.0 * 10.0 * 9.0) - 1.0).abs() < 0.02);
+    assert_eq!(notes, [format!("{told}: {range}, and the isovalue is -1; the surface is that of the grid")]);
+    let (nothing, notes) = build(-1.0, false);
+    assert!(nothing == Surface::default());
+    assert_eq!(notes, [format!("{told}: {range}, and the isovalue is -1; there is no surface")]);
+}
+
+#[test]
+fn a_scene_without_a_surface_runs_to_an_empty_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "
+name: nothing
+stages:
+  - scene:
+      id: void
+      objects:
+        - isosurface: {field: {formula: x + y}, isovalue: -7, grid: {min: [-1, -1, -1, -1], max: [1, 1, 1, 1], cells: 4}}
+  - occlusion: {samples: 16, file: ao.f32}
+  - render: {dimensions: [5, 5, 5]}
+  - write: {vti: image.vti, vtu: scene.vtu}
+";
+    let path = folder.path().join("nothing.yaml");
+    std::fs::write(&path, text).unwrap();
+    let out = folder.path().join("out");
+    let pipeline = ao4d::pipeline::Pipeline::load(&path, &[], Some(out.clone())).unwrap();
+    let report = ao4d::pipeline::run(&pipeline, &Default::default(), &ao4d::progress::Silent).unwrap();
+    let told = "scene void, object 1: isosurface.isovalue: the field is outside everywhere: its values go from -2 to 2";
+    assert!(report.notes.len() == 1 && report.notes[0].starts_with(told), "{:?}", report.notes);
+    let opacity = ao4d::volume::read(&out.join("image.vti")).unwrap().array("opacity").unwrap().values.to_f64();
+    assert!(opacity.len() == 125 && opacity.iter().all(|&o| o == 0.0));
+    assert_eq!(std::fs::metadata(out.join("ao.f32")).unwrap().len(), 0);
+}
+
+#[test]
+fn empty_files_of_every_kind_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for ending in ["vti", "raw", "nii", "nii.gz", "tif", "nc", "nrrd"] {
+        let name = format!("nothing.{ending}");
+        std::fs::write(folder.path().join(&name), b"").unwrap();
+        let message = try_build::<4>(folder.path(), json!({"file": name}), 1.0).unwrap_err();
+        assert!(message.ends_with(&format!("{name}: is empty")), "{message}");
+    }
+    for ending in ["stl", "obj", "ply", "msh", "vtu"] {
+        let name = format!("nothing.{ending}");
+        std::fs::write(folder.path().join(&name), b"").unwrap();
+        let spec: ObjectSpec = serde_json::from_value(json!({"extrude": {"mesh": name, "from": 0, "to": 1}})).unwrap();
+        let message = build_object::<4>(&spec, folder.path()).unwrap_err().to_string();
+        assert!(message.ends_with(&format!("{name}: is empty")), "{message}");
+    }
+}
+
+#[test]
+fn a_grid_too_large_to_go_over_is_refused_before_it_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    // Sparse: it takes no room on the disk.
+    let file = std::fs::File::create(folder.path().join("large.raw")).unwrap();
+    file.set_len(1024 * 1024 * 256 * 4).unwrap();
+    let image = json!({"file": "large.raw", "dimensions": [1024, 1024, 256, 4], "type": "uint8"});
+    let message = try_build::<4>(folder.path(), image, 1.0).unwrap_err();
+    assert!(
+        message.starts_with("isosurface.field.image: the grid has 1073741824 points, 268435456 in a layer"),
+        "{message}"
+    );
+}
+
 #[test]
 fn wrong_images_are_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -271,8 +385,6 @@ fn wrong_images_are_told() {
         image
     };
     for (image, isovalue, parts) in [
-        (raw_image("ball.raw"), 5000.0, ["isosurface.isovalue: the field is outside everywhere", "go from 0 to 8"]),
-        (raw_image("ball.raw"), -1.0, ["isosurface.isovalue: the field is inside everywhere", "go from 0 to 8"]),
         (json!({"file": "ball.raw"}), 1.0, ["isosurface.field.image.file", "give dimensions"]),
         (json!({"file": "ball.raw", "dimensions": POINTS}), 1.0, ["ball.raw", "give type, such as uint8"]),
         (raw(json!({"type": "uint8"})), 1.0, ["ball.raw", "has 34320 bytes, but 17160 numbers of 1 bytes"]),

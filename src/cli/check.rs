@@ -20,7 +20,9 @@ impl Check {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         let (pipelines, _settings) = self.options.load_all(console)?;
         for pipeline in &pipelines {
-            let counts = pipeline.prepare(|_| true)?.counts();
+            let prepared = pipeline.prepare(|_| true)?;
+            prepared.notes.iter().for_each(|note| console.note(&format!("note: {note}")));
+            let counts = prepared.counts();
             let description = pipeline.plan.describe(&counts);
             if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;
         }

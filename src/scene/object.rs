@@ -164,7 +164,7 @@ impl Shape<'_> {
     }
 
     /// The surface, before it is placed.
-    fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
+    fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
             Shape::File(path) => file::build(path, folder),
@@ -177,7 +177,7 @@ impl Shape<'_> {
                 Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
             }
             Shape::Sphere(spec) => spec.build("sphere"),
-            Shape::Isosurface(spec) => spec.build(folder),
+            Shape::Isosurface(spec) => spec.build(folder, notes),
             Shape::Spin(spec) => spec.build(folder),
             Shape::Polytope(spec) => spec.build(),
             Shape::Duoprism(spec) => spec.build(),
@@ -226,9 +226,18 @@ impl ObjectSpec {
 
 /// The object's surface where the scene has it. Paths are relative to `folder`.
 pub fn build_object<const D: usize>(spec: &ObjectSpec, folder: &Path) -> Result<Surface<D>, Error> {
+    build_object_with_notes(spec, folder, &mut Vec::new())
+}
+
+/// The same; what is allowed but worth telling is added to `notes`, each beginning with the key it is about.
+pub fn build_object_with_notes<const D: usize>(
+    spec: &ObjectSpec,
+    folder: &Path,
+    notes: &mut Vec<String>,
+) -> Result<Surface<D>, Error> {
     let shape = spec.shape()?;
     spec.color.rgb()?;
-    let mut surface = shape.build::<D>(folder)?;
+    let mut surface = shape.build::<D>(folder, notes)?;
     transform::apply("transform", &spec.transform, &mut surface)?;
     // Coordinates are rounded to single precision afterwards and must survive that.
     let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);

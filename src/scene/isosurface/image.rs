@@ -260,6 +260,7 @@ impl<const D: usize> ImageLayers<D> {
         }
         let size: usize = self.sizes[..D - 1].iter().product();
         let (mut sums, mut counts) = (vec![0f64; size], vec![0u32; size]);
+        let mut numbers = 0u64;
         let slices = if D == 4 { self.points[2] } else { 1 };
         for _ in 0..self.factors[D - 1] {
             for z in 0..slices {
@@ -273,11 +274,15 @@ impl<const D: usize> ImageLayers<D> {
                         for value in values.iter().filter(|value| !value.is_nan()) {
                             sums[start + x] += self.sign * (value - self.isovalue);
                             counts[start + x] += 1;
+                            numbers += 1;
                         }
                     }
                 }
             }
         }
+        let looked_at = size as u64 * self.factors.iter().product::<usize>() as u64;
+        self.seen.looked_at += looked_at;
+        self.seen.missing += looked_at - numbers;
         // Of what downsampling leaves over at the end nobody asks any more.
         Ok(sums
             .into_iter()

@@ -27,9 +27,13 @@ use super::Error;
 use super::lattice::divide;
 use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, finite};
 use crate::mesh::Surface;
+use crate::volume::available_memory;
 
-/// The most points a layer of a grid may have: three layers are held in memory.
+/// The most points a layer of a grid may have: a few layers are held in memory.
 const MOST_IN_LAYER: u128 = 1 << 27;
+
+/// Bytes that a point of a layer takes while the grid is gone over: as it is read, cropped, smoothed and marched on.
+const BYTES_IN_LAYER: u128 = 40;
 
 /// The most points of a grid: more would take minutes only to look at.
 const MOST_POINTS: u128 = 1 << 33;
@@ -94,15 +98,21 @@ impl IsosurfaceSpec {
         }
     }
 
-    /// The surface. Files are relative to `folder`.
-    pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
+    /// The surface. Files are relative to `folder`. Where the field never passes the isovalue there is none, or only the
+    /// grid's own border; `notes` say so, and how many values are no numbers.
+    pub fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         match &self.field {
-            Field::Image(image) => self.of_image(image, folder),
-            _ => self.of_formula(),
+            Field::Image(image) => self.of_image(image, folder, notes),
+            _ => self.of_formula(notes),
         }
     }
 
-    fn of_image<const D: usize>(&self, image: &ImageSpec, folder: &Path) -> Result<Surface<D>, Error> {
+    fn of_image<const D: usize>(
+        &self,
+        image: &ImageSpec,
+        folder: &Path,
+        notes: &mut Vec<String>,
+    ) -> Result<Surface<D>, Error> {
         if self.grid.is_some() {
             let message = "an image has a grid of its own; place it by spacing and origin, or take a part by crop";
             return Err(Error::invalid("isosurface.grid", message));
@@ -122,10 +132,10 @@ impl IsosurfaceSpec {
         if let (Ok(surface), 1) = (&mut surface, backwards % 2) {
             surface.simplices.iter_mut().for_each(|simplex| simplex.swap(D - 2, D - 1));
         }
-        finish(surface, &layers.seen, isovalue, self.smallest_component)
+        finish(surface, &layers.seen, isovalue, self.smallest_component, notes)
     }
 
-    fn of_formula<const D: usize>(&self) -> Result<Surface<D>, Error> {
+    fn of_formula<const D: usize>(&self, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         let isovalue = finite("isosurface.isovalue", self.isovalue.unwrap_or(0.0))?;
         let inside = self.inside.unwrap_or(Side::Below);
         let definition = self.field.define(D)?;
@@ -147,7 +157,7 @@ impl IsosurfaceSpec {
             seen: Seen::default(),
         };
         let surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut sampled);
-        finish(surface, &sampled.seen, isovalue, self.smallest_component)
+        finish(surface, &sampled.seen, isovalue, self.smallest_component, notes)
     }
 }
 
@@ -157,6 +167,7 @@ fn finish<const D: usize>(
     seen: &Seen,
     isovalue: f64,
     smallest: Option<u64>,
+    notes: &mut Vec<String>,
 ) -> Result<Surface<D>, Error> {
     let surface = match surface {
         Ok(surface) => surface,
@@ -169,14 +180,26 @@ fn finish<const D: usize>(
             return Err(Error::invalid("isosurface", message));
         }
     };
+    if seen.missing > 0 {
+        let (missing, all) = (seen.missing, seen.looked_at);
+        notes.push(format!("isosurface.field: {missing} of {all} values are no numbers; they count as outside"));
+    }
     if seen.inside == 0 || seen.outside == 0 {
-        let all = if seen.inside == 0 { "out" } else { "in" };
         let range = match seen.lowest <= seen.highest {
             true => format!("its values go from {} to {}", seen.lowest, seen.highest),
             false => "none of its values is a number".to_owned(),
         };
-        let message = format!("the field is {all}side everywhere: {range}, and the isovalue is {isovalue}");
-        return Err(Error::invalid("isosurface.isovalue", message));
+        let (all, rest) = match (seen.inside, surface.simplices.is_empty()) {
+            (0, _) => ("out", "there is no surface"),
+            (_, true) => ("in", "there is no surface"),
+            (_, false) => ("in", "the surface is that of the grid"),
+        };
+        notes.push(format!(
+            "isosurface.isovalue: the field is {all}side everywhere: {range}, and the isovalue is {isovalue}; {rest}"
+        ));
+        if surface.simplices.is_empty() {
+            return Ok(surface);
+        }
     }
     let surface = match smallest {
         None => surface,
@@ -224,6 +247,14 @@ fn check_grid<const D: usize>(key: &str, points: &[u128; D]) -> Result<(), Error
         );
         return Err(Error::invalid(key, message));
     }
+    if let Some(available) = available_memory().filter(|&n| layer * BYTES_IN_LAYER > u128::from(n)) {
+        let message = format!(
+            "a layer of the grid has {layer} points, which take {} bytes of memory, and {available} are free; \
+             take a part of it, or fewer points",
+            layer * BYTES_IN_LAYER
+        );
+        return Err(Error::invalid(key, message));
+    }
     Ok(())
 }
 
@@ -234,11 +265,14 @@ struct Seen {
     highest: f64,
     inside: u64,
     outside: u64,
+    /// Values that are no numbers, of how many that were looked at.
+    missing: u64,
+    looked_at: u64,
 }
 
 impl Default for Seen {
     fn default() -> Self {
-        Self { lowest: f64::INFINITY, highest: f64::NEG_INFINITY, inside: 0, outside: 0 }
+        Self { lowest: f64::INFINITY, highest: f64::NEG_INFINITY, inside: 0, outside: 0, missing: 0, looked_at: 0 }
     }
 }
 
@@ -249,12 +283,16 @@ impl Seen {
             highest: self.highest.max(other.highest),
             inside: self.inside + other.inside,
             outside: self.outside + other.outside,
+            missing: self.missing + other.missing,
+            looked_at: self.looked_at + other.looked_at,
         }
     }
 
     /// Notes a value, and returns how far it is inside.
     #[inline]
     fn look(&mut self, value: f64, isovalue: f64, sign: f64) -> f32 {
+        self.looked_at += 1;
+        self.missing += u64::from(value.is_nan());
         self.lowest = self.lowest.min(value);
         self.highest = self.highest.max(value);
         let depth = (sign * (value - isovalue)) as f32;

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::Error;
 use super::Input;
-use crate::volume::Kind;
+use crate::volume::{Kind, available_memory};
 
 /// The sizes and places of an image: x, y, z, time.
 #[derive(Clone, Debug, PartialEq)]
@@ -222,6 +222,17 @@ impl Slices for Held {
         let slice = self.values.get(self.next..self.next + self.size).ok_or("has no more slices")?;
         self.next += self.size;
         Ok(slice.to_vec())
+    }
+}
+
+/// Refuses to hold so many bytes where there is no room for them.
+fn room_for(bytes: u64) -> Result<(), String> {
+    match available_memory().filter(|&available| bytes > available) {
+        None => Ok(()),
+        Some(available) => Err(format!(
+            "takes {bytes} bytes of memory or more, and {available} are free: this format is read as a whole; \
+             save it as .nrrd, .nii or .raw, which are read layer by layer"
+        )),
     }
 }
 

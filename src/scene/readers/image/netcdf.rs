@@ -7,7 +7,7 @@ use std::path::Path;
 
 use netcdf3::{DataVector, FileReader, Variable};
 
-use super::{Header, Held, Image, Request, counted};
+use super::{Header, Held, Image, Request, counted, room_for};
 
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image, String> {
     let mut magic = [0; 4];
@@ -29,6 +29,7 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image,
     if counted(points, 1)? > length {
         return Err(format!("is cut off: variable \"{name}\" has {points:?} points, the file {length} bytes"));
     }
+    room_for(counted(points, 2 * size_of::<f64>())?)?;
     let attribute = |key: &str| {
         variable.get_attr(key).and_then(|attribute| {
             let numbers = attribute.get_f64().map(|v| v.to_vec());

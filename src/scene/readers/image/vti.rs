@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::{Header, Held, Image, Request};
+use super::{Header, Held, Image, Request, room_for};
 use crate::volume;
 
-pub(super) fn open(path: &Path, _: u64, request: &Request) -> Result<Image, String> {
+pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image, String> {
+    room_for(length.saturating_mul(2))?;
     let image = volume::read(path).map_err(|error| {
         // The error names the file, as whoever asked does.
         let text = error.to_string();
