@@ -236,8 +236,24 @@ fn room_for(bytes: u64) -> Result<(), String> {
     }
 }
 
-/// The number of points, if a file of this many bytes could hold it at this many bytes a point.
+/// The most bytes that come out of one byte of gzip: 258 for two bits, in a long run of one value.
+const MOST_FROM_GZIP: u64 = 1032;
+
+/// Refuses a size that a file can't hold from this byte on, even if compressed, before anything is made of that size.
+fn holds(needed: u64, offset: u64, length: u64, compressed: bool) -> Result<(), String> {
+    let there = length.saturating_sub(offset).saturating_mul(if compressed { MOST_FROM_GZIP } else { 1 });
+    if needed <= there {
+        return Ok(());
+    }
+    let most = if compressed { " when unpacked at most" } else { "" };
+    Err(format!("is cut off: {needed} bytes of values from byte {offset} on, but there are {there}{most}"))
+}
+
+/// The bytes that so many points take at this many bytes a point, which are as many as can be and some.
 fn counted(points: [usize; 4], bytes_a_point: usize) -> Result<u64, String> {
+    if points.contains(&0) {
+        return Err(format!("holds no point: its sizes are {points:?}"));
+    }
     points
         .iter()
         .try_fold(bytes_a_point as u64, |product, &n| product.checked_mul(n as u64))

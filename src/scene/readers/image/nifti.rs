@@ -9,7 +9,7 @@ use std::path::Path;
 use ::nifti::{Endianness, NiftiHeader};
 
 use super::bytes::{Bytes, stream};
-use super::{Header, Image, Request, counted};
+use super::{Header, Image, Request, counted, holds};
 use crate::volume::Kind;
 
 pub(super) fn open(path: &Path, length: u64, _: &Request) -> Result<Image, String> {
@@ -42,9 +42,10 @@ pub(super) fn open(path: &Path, length: u64, _: &Request) -> Result<Image, Strin
     };
     let needed = counted(points, kind.size())?;
     let offset = header.vox_offset;
-    if !(348.0..=1e9).contains(&offset) || !compressed && (offset as u64).saturating_add(needed) > length {
-        return Err(format!("is cut off: {needed} bytes of values from byte {offset} on, but it has {length} bytes"));
+    if !(348.0..=1e9).contains(&offset) {
+        return Err(format!("says that its values begin at byte {offset}, which can't be"));
     }
+    holds(needed, if compressed { 0 } else { offset as u64 }, length, compressed)?;
     std::io::copy(&mut reader.by_ref().take(offset as u64 - 348), &mut std::io::sink()).map_err(|e| e.to_string())?;
     // A slope of 0 means that there is none.
     let scaled = header.scl_slope != 0.0 && header.scl_slope.is_finite() && header.scl_inter.is_finite();

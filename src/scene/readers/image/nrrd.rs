@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use super::bytes::{Bytes, stream};
-use super::{Header, Image, Request, counted};
+use super::{Header, Image, Request, counted, holds};
 use crate::volume::Kind;
 
 /// The longest header that is believed to be one.
@@ -60,11 +60,7 @@ pub(super) fn open(path: &Path, _: u64, _: &Request) -> Result<Image, String> {
     };
     let needed = counted(points, kind.size())?;
     let length = std::fs::metadata(&values).map_err(|e| format!("names {}: {e}", values.display()))?.len();
-    if !compressed && offset.saturating_add(needed) > length {
-        return Err(format!(
-            "is cut off: {needed} bytes of values from byte {offset} on, but there are {length} bytes"
-        ));
-    }
+    holds(needed, offset, length, compressed)?;
     let spacing = spacing(field("spacings"), field("space directions"));
     let slices = Bytes {
         reader: stream(&values, offset, compressed)?,

@@ -30,6 +30,10 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image,
     };
     let mut pages = begin()?;
     let (width, height) = pages.dimensions().map_err(|e| format!("has no size: {e}"))?;
+    // LZW makes at most 4096 bytes of twelve bits, and a point takes one bit at least.
+    if u64::from(width) * u64::from(height) / 8 > length.saturating_mul(2731) || width == 0 || height == 0 {
+        return Err(format!("is cut off: it declares pages of {width} x {height} points, but has {length} bytes"));
+    }
     let description = pages.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
     let resolution = [Tag::XResolution, Tag::YResolution].map(|tag| match pages.find_tag(tag) {
         Ok(Some(Value::Rational(count, unit))) if count > 0 => f64::from(unit) / f64::from(count),
