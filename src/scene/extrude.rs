@@ -9,7 +9,7 @@
 //!
 //! (see [`super::product`]): walls over its boundary triangles, and the solid itself as the two caps. With t tetrahedra,
 //! f boundary triangles and m layers that makes 2 t + 3 m f tetrahedra. The surface of a closed triangle mesh sweeps walls
-//! only, which are open at both ends; its caps would need the inside meshed.
+//! only, which are open at both ends, unless caps are asked for: then its inside is cut into tetrahedra ([`super::fill`]).
 //!
 //! A motion moves, turns and scales the mesh from layer to layer: the surface is then that of a moving body in spacetime.
 //!
@@ -22,6 +22,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
+use super::fill::fill;
 use super::lattice::compact;
 use super::numbers::{check_count, finite, point};
 use super::product::Chain;
@@ -41,7 +42,8 @@ pub struct ExtrudeSpec {
     pub from: f64,
     /// Where it ends.
     pub to: f64,
-    /// Whether to close both ends. Tetrahedra can be, and are if this is left out; triangles can't be yet.
+    /// Whether to close both ends. Tetrahedra are closed if this is left out. The inside of a closed surface of triangles
+    /// is cut into tetrahedra if this is `true`, which divides the triangles as well; else they sweep walls only.
     #[serde(default)]
     pub caps: Option<bool>,
     /// Layers of prisms between both ends; 1 if left out.
@@ -87,15 +89,18 @@ impl ExtrudeSpec {
         let mesh = input.read()?;
         let swept = match mesh.cells {
             Cells::Triangles(triangles) => {
-                if self.caps == Some(true) {
-                    let message = "caps need the solid meshed, and this mesh is of triangles; \
-                                   give a tetrahedral mesh (.vtu, .msh) or write caps: false";
-                    return Err(Error::invalid("extrude.caps", message));
-                }
                 let (points, triangles) = weld(&mesh.points, triangles);
-                self.check_size(points.len(), 0, triangles.len())?;
-                let triangles = Chain::of(points.len() as u32, &triangles);
-                Swept { points, chain: triangles.times(&Chain::interval(self.layers)) }
+                let interval = Chain::interval(self.layers);
+                if self.caps == Some(true) {
+                    let (points, tetrahedra) = fill(&points, &triangles).map_err(|message| input.wrong(message))?;
+                    let solid = Chain::of(points.len() as u32, &tetrahedra);
+                    self.check_size(points.len(), solid.len(), solid.boundary().len())?;
+                    Swept { points, chain: solid.boundary_of_product(&interval) }
+                } else {
+                    self.check_size(points.len(), 0, triangles.len())?;
+                    let triangles = Chain::of(points.len() as u32, &triangles);
+                    Swept { points, chain: triangles.times(&interval) }
+                }
             }
             Cells::Tetrahedra(tetrahedra) => {
                 let (points, tetrahedra) = weld(&mesh.points, tetrahedra);

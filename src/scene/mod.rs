@@ -26,6 +26,7 @@ mod disc;
 mod error;
 mod extrude;
 mod file;
+mod fill;
 mod hypersphere;
 pub mod isosurface;
 pub mod lattice;

@@ -17,7 +17,7 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image,
             if magic[1..] == *b"HDF" { "a NetCDF-4 file; convert it: nccopy -k 64-bit-offset" } else { "foreign" };
         return Err(format!("is no NetCDF-3 file but {what}"));
     }
-    let mut file = FileReader::open(path).map_err(|e| format!("is cut off, or damaged: {e:?}"))?;
+    let mut file = FileReader::open(path).map_err(|e| format!("is cut off, or damaged: {}", brief(&e)))?;
     let variable = choose(&file, request.array.as_deref())?;
     let name = variable.name().to_owned();
     let dimensions: Vec<(String, usize)> = variable.get_dims().iter().map(|d| (d.name(), d.size())).collect();
@@ -65,7 +65,8 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image,
             header.positions[axis] = places;
         }
     }
-    let read = file.read_var(&name).map_err(|e| format!("is cut off, or damaged: variable \"{name}\": {e:?}"))?;
+    let read =
+        file.read_var(&name).map_err(|e| format!("is cut off, or damaged: variable \"{name}\": {}", brief(&e)))?;
     let mut values = numbers(read);
     let size: usize = points.iter().product();
     if values.len() != size {
@@ -92,6 +93,13 @@ fn choose(file: &FileReader, name: Option<&str>) -> Result<Variable, String> {
             Err(format!("has {} variables with three dimensions or more; give array, one of {}", large.len(), known()))
         }
     }
+}
+
+/// The crate's errors say what they are only as `Debug`, and some cite the rest of the file.
+fn brief(error: &impl std::fmt::Debug) -> String {
+    let text = format!("{error:?}");
+    let end = text.find(", invalid_bytes").unwrap_or(text.len());
+    text[..end].chars().take(120).collect()
 }
 
 fn numbers(vector: DataVector) -> Vec<f64> {
