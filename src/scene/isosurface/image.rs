@@ -259,6 +259,9 @@ impl<const D: usize> ImageLayers<D> {
             self.slice()?;
         }
         let size: usize = self.sizes[..D - 1].iter().product();
+        if self.factors == [1; D] {
+            return self.read_as_it_is(size);
+        }
         let (mut sums, mut counts) = (vec![0f64; size], vec![0u32; size]);
         let mut numbers = 0u64;
         let slices = if D == 4 { self.points[2] } else { 1 };
@@ -289,6 +292,27 @@ impl<const D: usize> ImageLayers<D> {
             .zip(counts)
             .map(|(sum, n)| if n == 0 { f32::NAN } else { (sum / f64::from(n)) as f32 })
             .collect())
+    }
+
+    /// The same without downsampling: nothing to add up.
+    fn read_as_it_is(&mut self, size: usize) -> Result<Vec<f32>, Error> {
+        let (width, area) = (self.sizes[0], self.sizes[0] * self.sizes[1]);
+        let mut layer = vec![0f32; size];
+        for z in 0..if D == 4 { self.points[2] } else { 1 } {
+            let slice = self.slice()?;
+            let Some(z) = (if D == 4 { self.place(2, z) } else { Some(0) }) else { continue };
+            let (isovalue, sign, from, points) = (self.isovalue, self.sign, self.from, self.points);
+            let rows = if D == 4 { &mut layer[z * area..][..area] } else { &mut layer[..] };
+            rows.par_chunks_mut(width).with_min_len(64).enumerate().for_each(|(y, row)| {
+                let start = (y + from[1]) * points[0] + from[0];
+                row.iter_mut()
+                    .zip(&slice[start..])
+                    .for_each(|(slot, value)| *slot = (sign * (value - isovalue)) as f32);
+            });
+        }
+        self.seen.looked_at += size as u64;
+        self.seen.missing += layer.par_iter().with_min_len(4096).filter(|depth| depth.is_nan()).count() as u64;
+        Ok(layer)
     }
 
     /// Where an index of the whole grid goes, if it remains.

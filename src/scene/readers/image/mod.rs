@@ -7,6 +7,7 @@
 
 mod bytes;
 mod netcdf;
+mod netcdf_header;
 mod nifti;
 mod nrrd;
 mod tiff;

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use netcdf3::{DataVector, FileReader, Variable};
 
-use super::{Header, Held, Image, Request, counted, room_for};
+use super::{Header, Held, Image, Request, counted, netcdf_header, room_for};
 
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image, String> {
     let mut magic = [0; 4];
@@ -17,6 +17,7 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image,
             if magic[1..] == *b"HDF" { "a NetCDF-4 file; convert it: nccopy -k 64-bit-offset" } else { "foreign" };
         return Err(format!("is no NetCDF-3 file but {what}"));
     }
+    netcdf_header::check(path)?;
     let mut file = FileReader::open(path).map_err(|e| format!("is cut off, or damaged: {}", brief(&e)))?;
     let variable = choose(&file, request.array.as_deref())?;
     let name = variable.name().to_owned();
