@@ -519,7 +519,7 @@ fn bodies_of_revolution() {
 }
 
 #[test]
-fn meshes_from_obj_and_msh() {
+fn meshes_from_obj_msh_and_vtk() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     let extruded =
@@ -535,7 +535,24 @@ fn meshes_from_obj_and_msh() {
         $Nodes\n2 4 3 12\n0 1 0 1\n7\n0 0 0\n3 1 0 3\n3\n12\n5\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n\
         $Elements\n2 2 1 9\n0 1 15 1\n1 7\n3 1 4 1\n9 7 3 12 5\n$EndElements\n";
     write("four.msh", fourth);
-    for name in ["two.msh", "four.msh"] {
+    let text = "# vtk DataFile Version 3.0\ncorner\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n\
+        0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 9\n4 0 1 2 3\n3 0 1 2\nCELL_TYPES 2\n10\n5\nPOINT_DATA 4\n";
+    write("old.vtk", text);
+    let mut binary = b"# vtk DataFile Version 5.1\nc\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n".to_vec();
+    [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].iter().for_each(|x| binary.extend(x.to_be_bytes()));
+    binary.extend(b"\nMETADATA\nINFORMATION 0\n\nCELLS 2 4\nOFFSETS vtktypeint64\n");
+    [0i64, 4].iter().for_each(|x| binary.extend(x.to_be_bytes()));
+    binary.extend(b"\nCONNECTIVITY vtktypeint64\n");
+    [0i64, 1, 2, 3].iter().for_each(|x| binary.extend(x.to_be_bytes()));
+    binary.extend(b"\nCELL_TYPES 1\n");
+    binary.extend(10i32.to_be_bytes());
+    std::fs::write(folder.path().join("new.vtk"), &binary).unwrap();
+    std::fs::write(folder.path().join("cut.vtk"), &binary[..binary.len() - 30]).unwrap();
+    write("hex.vtk", &text.replace("10\n5\n", "12\n5\n"));
+    write("types.vtk", &text.replace("CELL_TYPES 2\n10\n5\n", "CELL_TYPES 1\n10\n"));
+    write("many.vtk", &text.replace("POINTS 4", "POINTS 6000000000000000000"));
+    write("image.vtk", &text.replace("UNSTRUCTURED_GRID", "STRUCTURED_POINTS"));
+    for name in ["two.msh", "four.msh", "old.vtk", "new.vtk"] {
         let surface = extruded(name).unwrap();
         assert_closed_manifold(&surface);
         near(volume(&surface), 2.0 / 6.0, 1e-14);
@@ -567,6 +584,11 @@ fn meshes_from_obj_and_msh() {
         ("old.msh", "is of version 1; 2.2 and 4.1"),
         ("cut.msh", "is cut off"),
         ("none.msh", "has no $MeshFormat"),
+        ("cut.vtk", "is cut off"),
+        ("hex.vtk", "has a cell of type 12, which is not understood"),
+        ("types.vtk", "has 2 cells and 1 types of cells"),
+        ("many.vtk", "is cut off: it declares more numbers than there are"),
+        ("image.vtk", "holds STRUCTURED_POINTS; UNSTRUCTURED_GRID and POLYDATA are understood"),
     ] {
         let found = extruded(name).unwrap_err().to_string();
         assert!(found.contains(message) && found.contains(name), "{found}");

@@ -143,7 +143,7 @@ fn surfaces_without_an_inside_are_refused() {
         (together(cube(0.0, 1.0, 1), &moved), "passes through itself"),
         (together(cube(0.0, 1.0, 1), &cube(0.25, 0.75, 1)), "passes through itself"),
         (together(cube(0.0, 1.0, 1), &turned(cube(2.0, 3.0, 1))), "passes through itself"),
-        (flat, "encloses nothing"),
+        (flat, "has triangles that lie on each other"),
     ] {
         let found = capped(&surface).unwrap_err();
         assert!(found.starts_with("extrude.mesh: ") && found.contains(message), "{found}");

@@ -163,6 +163,25 @@ const VTU: &str = "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order
     <DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray>\
     <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>";
 
+/// The corner tetrahedron as a legacy file: as text in the old layout, or binary in the new one.
+fn vtk(binary: bool) -> Vec<u8> {
+    if !binary {
+        return b"# vtk DataFile Version 3.0\nc\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\n\
+            CELLS 2 9\n4 0 1 2 3\n3 0 1 2\nCELL_TYPES 2\n10 5\n"
+            .to_vec();
+    }
+    let mut bytes = b"# vtk DataFile Version 5.1\nc\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n".to_vec();
+    CORNERS.iter().flatten().for_each(|x| bytes.extend(f64::from(*x).to_be_bytes()));
+    bytes.extend(b"\nMETADATA\nINFORMATION 0\n\nCELLS 2 4\nOFFSETS vtktypeint64\n");
+    [0i64, 4].iter().for_each(|x| bytes.extend(x.to_be_bytes()));
+    bytes.extend(b"\nCONNECTIVITY vtktypeint64\n");
+    [0i64, 1, 2, 3].iter().for_each(|x| bytes.extend(x.to_be_bytes()));
+    bytes.extend(b"\nCELL_TYPES 1\n");
+    bytes.extend(10i32.to_be_bytes());
+    bytes.extend(b"\nCELL_DATA 1\n");
+    bytes
+}
+
 /// What hides in a header where damage hurts most.
 const NASTY: [&[u8]; 12] = [
     b"-1",
@@ -259,6 +278,8 @@ fn damaged_files_are_read_or_refused() {
         ("x.obj", obj().into_bytes(), extruded("x.obj")),
         ("x.msh", MSH_2.as_bytes().to_vec(), extruded("x.msh")),
         ("y.msh", MSH_4.as_bytes().to_vec(), extruded("y.msh")),
+        ("x.vtk", vtk(false), extruded("x.vtk")),
+        ("y.vtk", vtk(true), extruded("y.vtk")),
         ("x.vtu", VTU.as_bytes().to_vec(), extruded("x.vtu")),
         ("y.vtu", std::fs::read(meshes.join("nut.vtu")).unwrap(), extruded("y.vtu")),
     ];

@@ -36,7 +36,8 @@ use crate::mesh::Surface;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExtrudeSpec {
-    /// The mesh: triangles (`.stl`, `.obj`, `.ply`, `.msh`, `.vtu`) or tetrahedra (`.vtu`, `.msh`). Relative to the pipeline's folder.
+    /// The mesh: triangles (`.stl`, `.obj`, `.ply`, `.msh`, `.vtk`, `.vtu`) or tetrahedra (`.vtu`, `.vtk`,
+    /// `.msh`). Relative to the pipeline's folder.
     pub mesh: PathBuf,
     /// Where the sweep begins along the direction.
     pub from: f64,

@@ -9,7 +9,7 @@
 //! | `simplices` | vertices and simplices as listed | - |
 //! | `file` | a surface from a file | [`readers`] |
 //! | `box`, `tesseract` | boundary of a product of intervals | [`product`] |
-//! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`] |
+//! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`], `fill` |
 //! | `cut_cube` | a box minus boxes | [`lattice`] |
 //! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
 //! | `spin` | a 3D mesh turned round in a plane with w | [`readers`], [`product`] |

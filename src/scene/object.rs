@@ -31,7 +31,7 @@ pub struct ObjectSpec {
     #[serde(default)]
     pub simplices: Option<SimplicesSpec>,
     /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.obj`, `.ply`,
-    /// `.msh`, `.vtu` in 3D.
+    /// `.msh`, `.vtk`, `.vtu` in 3D.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// Shape: a three-dimensional mesh swept along the fourth axis.

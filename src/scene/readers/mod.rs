@@ -1,4 +1,5 @@
-//! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu` and `.msh`. And [`image`]s.
+//! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu`, `.vtk` and
+//! `.msh`. And [`image`]s.
 //!
 //! A file is read whole, so that declared sizes can be held against its length before anything is allocated. Whatever
 //! it holds, the answer is a mesh whose indices are within range and whose coordinates are finite, or an error that
@@ -9,6 +10,7 @@ mod msh;
 mod obj;
 mod ply;
 mod stl;
+mod vtk;
 mod vtu;
 
 use std::path::{Path, PathBuf};
@@ -95,10 +97,13 @@ impl Input {
             "stl" => stl::read,
             "ply" => ply::read,
             "vtu" => vtu::read,
+            "vtk" => vtk::read,
             "obj" => obj::read,
             "msh" => msh::read,
             _ => {
-                return Err(self.wrong("can't tell what it holds; the name must end in .stl, .obj, .ply, .msh or .vtu"));
+                return Err(
+                    self.wrong("can't tell what it holds; the name must end in .stl, .obj, .ply, .msh, .vtk or .vtu")
+                );
             }
         };
         let bytes = std::fs::read(&self.path).map_err(|source| self.unreadable(source))?;
