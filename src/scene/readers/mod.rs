@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 use super::Error;
 use crate::geometry::Vector64;
 
+/// Characters of a message about a file.
+const LONGEST_MESSAGE: usize = 500;
+
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileMesh {
@@ -83,7 +86,13 @@ impl Input {
 
     /// The error that the file holds something wrong.
     pub fn wrong(&self, message: impl Into<String>) -> Error {
-        Error::Content { key: self.key.clone(), path: self.path.clone(), message: message.into() }
+        let mut message = message.into();
+        // Some readers cite what is damaged at length.
+        if let Some((end, _)) = message.char_indices().nth(LONGEST_MESSAGE) {
+            message.truncate(end);
+            message.push_str(" ...");
+        }
+        Error::Content { key: self.key.clone(), path: self.path.clone(), message }
     }
 
     fn unreadable(&self, source: std::io::Error) -> Error {
