@@ -709,7 +709,7 @@ fn damaged_files_are_refused_by_name() {
         let found = folder.read::<3>(name).unwrap_err();
         assert!(found.starts_with("file: ") && found.contains(name) && found.contains(message), "{found}");
     };
-    for ending in ["stl", "ply", "vtu"] {
+    for ending in ["stl", "obj", "ply", "msh", "vtk", "vtu"] {
         refused(&format!("empty.{ending}"), b"", "is empty");
         let foreign = b"PK\x03\x04 something else altogether, long enough to be taken for a header of eighty bytes \xff\xff\xff\xff";
         refused(&format!("foreign.{ending}"), foreign, " ");
@@ -719,7 +719,7 @@ fn damaged_files_are_refused_by_name() {
     }
     refused("mesh.obj", b"v 0 0 0", "holds no triangle");
     refused("mesh.off", b"OFF", "the name must end in .stl, .obj, .ply, .msh, .vtk or .vtu");
-    refused("no-name", b"v 0 0 0", "the name must end in .stl, .ply or .vtu");
+    refused("no-name", b"v 0 0 0", "the name must end in .stl, .obj, .ply, .msh, .vtk or .vtu");
     refused("cut.stl", &binary_stl("x")[..100], "it declares 4 triangles, which take 284 bytes, and has 100");
     refused("none.stl", ascii_stl("", &[]).as_bytes(), "holds no triangle");
     refused("word.stl", ascii_stl("", &CORNER).replace("vertex 1", "vertex one").as_bytes(), "triangle 0");

@@ -39,7 +39,10 @@ pub fn read(bytes: &[u8]) -> Result<FileMesh, String> {
                 let count = file.whole()?;
                 types = file.numbers(Some(count), Kind::I32)?;
             }
-            "METADATA" => while !file.line()?.trim().is_empty() {},
+            "METADATA" => {
+                file.line()?;
+                while !file.line()?.trim().is_empty() {}
+            }
             // Points and cells come before them.
             "POINT_DATA" | "CELL_DATA" => break,
             other => return Err(format!("has \"{}\" where points or cells should be", brief(other))),
