@@ -234,7 +234,8 @@ fn extruded_triangles_are_walls() {
         }
     }
     let refused = refusal::<4>(json!({"extrude": {"mesh": "ant.ply", "from": 0, "to": 1, "caps": true}}));
-    assert!(refused.starts_with("extrude.caps: caps need the solid meshed") && refused.contains("caps: false"));
+    // Its legs reach into its body.
+    assert!(refused.starts_with("extrude.mesh: ") && refused.contains("write caps: false for walls only"), "{refused}");
 }
 
 #[test]
@@ -324,7 +325,7 @@ fn refusals_name_key_value_and_remedy() {
     let refused = [
         (
             json!({}),
-            "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, hypersphere, sphere, isosurface",
+            "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, hypersphere, sphere, isosurface, spin, polytope, duoprism, duocylinder, spherinder, cubinder",
         ),
         (
             json!({"tesseract": {}, "hypersphere": {"radius": 1, "subdivisions": 1}}),
@@ -708,7 +709,7 @@ fn damaged_files_are_refused_by_name() {
         let found = folder.read::<3>(name).unwrap_err();
         assert!(found.starts_with("file: ") && found.contains(name) && found.contains(message), "{found}");
     };
-    for ending in ["stl", "ply", "vtu"] {
+    for ending in ["stl", "obj", "ply", "msh", "vtk", "vtu"] {
         refused(&format!("empty.{ending}"), b"", "is empty");
         let foreign = b"PK\x03\x04 something else altogether, long enough to be taken for a header of eighty bytes \xff\xff\xff\xff";
         refused(&format!("foreign.{ending}"), foreign, " ");
@@ -716,8 +717,9 @@ fn damaged_files_are_refused_by_name() {
         std::fs::create_dir(folder.0.path().join(format!("folder.{ending}"))).unwrap();
         assert!(folder.read::<3>(&format!("folder.{ending}")).unwrap_err().contains("can't read"));
     }
-    refused("mesh.obj", b"v 0 0 0", "the name must end in .stl, .ply or .vtu");
-    refused("no-name", b"v 0 0 0", "the name must end in .stl, .ply or .vtu");
+    refused("mesh.obj", b"v 0 0 0", "holds no triangle");
+    refused("mesh.off", b"OFF", "the name must end in .stl, .obj, .ply, .msh, .vtk or .vtu");
+    refused("no-name", b"v 0 0 0", "the name must end in .stl, .obj, .ply, .msh, .vtk or .vtu");
     refused("cut.stl", &binary_stl("x")[..100], "it declares 4 triangles, which take 284 bytes, and has 100");
     refused("none.stl", ascii_stl("", &[]).as_bytes(), "holds no triangle");
     refused("word.stl", ascii_stl("", &CORNER).replace("vertex 1", "vertex one").as_bytes(), "triangle 0");

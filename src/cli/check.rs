@@ -25,7 +25,9 @@ impl Check {
             OpenCl::open(place).map_err(|error| Failure::Failed(Box::new(error)))?;
         }
         for pipeline in &pipelines {
-            let counts = pipeline.prepare(|_| true)?.counts();
+            let prepared = pipeline.prepare(|_| true)?;
+            prepared.notes.iter().for_each(|note| console.note(&format!("note: {note}")));
+            let counts = prepared.counts();
             let description = pipeline.plan.describe(&counts);
             if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;
         }

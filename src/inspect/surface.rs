@@ -13,7 +13,7 @@ use super::range::Short;
 use crate::geometry::{Vector64, is_degenerate, narrow};
 use crate::mesh::identity::identities;
 use crate::mesh::topology::{
-    components, corners, enclosed_volume, f_vector, facet_pairs, surface_measure, worst_quality,
+    components, corners, enclosed_volume, f_vector, facet_pairs, singular_vertices, surface_measure, worst_quality,
 };
 use crate::volume::vtk::{TETRAHEDRON, TRIANGLE, UnstructuredGrid};
 
@@ -49,7 +49,7 @@ pub struct SurfaceSummary {
     pub closed: bool,
     /// Whether neighbouring simplices agree on which side is outside.
     pub oriented: bool,
-    /// Whether no facet has more than two simplices.
+    /// Whether no facet has more than two simplices, and no vertex is one where the surface touches itself.
     pub manifold: bool,
     /// Whether no two points have the same coordinates.
     pub welded: bool,
@@ -59,6 +59,8 @@ pub struct SurfaceSummary {
     pub misoriented_facets: usize,
     /// Facets of more than two simplices.
     pub crowded_facets: usize,
+    /// Vertices where the surface touches itself: around them it is no ball, nor at a rim half of one.
+    pub singular_vertices: usize,
     /// Points whose coordinates an earlier point has.
     pub duplicate_points: usize,
     /// Points that no simplex uses.
@@ -111,6 +113,7 @@ impl SurfaceSummary {
         simplices.as_flattened().iter().for_each(|&v| unused[v as usize] = false);
         let pairs = facet_pairs(&welded);
         let f_vector = f_vector(&welded);
+        let singular = singular_vertices(&welded);
         let worst = worst_quality(corners(points, simplices));
         Some(Self {
             form,
@@ -120,11 +123,12 @@ impl SurfaceSummary {
             // What doesn't cancel may only be neighbours that disagree.
             closed: pairs.open == 0 && pairs.unbalanced == pairs.misoriented,
             oriented: pairs.misoriented == 0,
-            manifold: pairs.crowded == 0,
+            manifold: pairs.crowded == 0 && singular == 0,
             welded: identity.iter().enumerate().all(|(i, &v)| i == v as usize),
             open_facets: pairs.open,
             misoriented_facets: pairs.misoriented,
             crowded_facets: pairs.crowded,
+            singular_vertices: singular,
             duplicate_points: identity.iter().enumerate().filter(|&(i, &v)| i != v as usize).count(),
             unused_points: unused.iter().filter(|&&u| u).count(),
             degenerate_simplices: (simplices.iter()).filter(|s| is_degenerate(&s.map(|v| rounded[v as usize]))).count(),
@@ -161,9 +165,11 @@ impl fmt::Display for SurfaceSummary {
             (true, _) => writeln!(f, "  oriented")?,
             (false, n) => writeln!(f, "  not oriented: neighbours disagree at {}", many(n, facet))?,
         }
-        match self.crowded_facets {
-            0 => writeln!(f, "  manifold")?,
-            n => writeln!(f, "  not manifold: {} with more than two neighbours", many(n, facet))?,
+        match (self.crowded_facets, self.singular_vertices) {
+            (0, 0) => writeln!(f, "  manifold")?,
+            (0, 1) => writeln!(f, "  not manifold: it touches itself at 1 vertex")?,
+            (0, n) => writeln!(f, "  not manifold: it touches itself at {n} vertices")?,
+            (n, _) => writeln!(f, "  not manifold: {} with more than two neighbours", many(n, facet))?,
         }
         match self.duplicate_points {
             0 => writeln!(f, "  welded")?,

@@ -11,6 +11,8 @@
 //!
 //! which is positive when the normals point outwards. For an open surface the sum depends on p and means nothing.
 
+use rayon::prelude::*;
+
 use crate::geometry::{Vector64, determinant, measure};
 
 /// How the facets of a surface are shared.
@@ -145,6 +147,82 @@ pub fn components<const D: usize>(simplices: &[[u32; D]]) -> usize {
     pieces
 }
 
+/// How many vertices there are where the surface touches itself: whose simplices, cut off around the vertex, make up
+/// something else than a sphere or, at a rim, a disc (in 3D: a circle or a path). Two cones tip to tip are the simplest
+/// case, and in 4D also two bodies that share an edge. Vertices are told apart by index.
+pub fn singular_vertices<const D: usize>(simplices: &[[u32; D]]) -> usize {
+    let mut corners: Vec<(u32, u32)> = (simplices.iter().enumerate())
+        .flat_map(|(s, simplex)| simplex.iter().map(move |&vertex| (vertex, s as u32)))
+        .collect();
+    corners.par_sort_unstable();
+    // A simplex that names a vertex twice has no measure; what is around it is judged without it.
+    corners.dedup();
+    let stars: Vec<&[(u32, u32)]> = corners.chunk_by(|a, b| a.0 == b.0).collect();
+    stars.par_iter().filter(|star| !is_regular(star, simplices)).count()
+}
+
+/// Whether the link of a vertex is a sphere or a disc of dimension D - 2, by its Euler characteristic: of all connected
+/// closed surfaces only the sphere has 2, of those with a rim only the disc has 1, and points where such a surface touches
+/// itself lower it.
+fn is_regular<const D: usize>(star: &[(u32, u32)], simplices: &[[u32; D]]) -> bool {
+    let mut link: Vec<[u32; D]> = Vec::with_capacity(star.len());
+    for &(vertex, s) in star {
+        let mut simplex = simplices[s as usize];
+        simplex.sort_unstable();
+        if simplex.windows(2).any(|pair| pair[0] == pair[1]) {
+            continue;
+        }
+        // The vertex goes to the end, where it is out of the way; the others stay sorted.
+        let place = simplex.iter().position(|&v| v == vertex).unwrap_or(D - 1);
+        simplex[place..].rotate_left(1);
+        link.push(simplex);
+    }
+    if link.is_empty() {
+        return true;
+    }
+    let mut ridges: Vec<([u32; 2], u32)> = Vec::with_capacity(link.len() * (D - 1));
+    let mut vertices: Vec<u32> = Vec::with_capacity(link.len() * (D - 1));
+    for (i, face) in link.iter().enumerate() {
+        vertices.extend(&face[..D - 1]);
+        for left_out in 0..D - 1 {
+            let mut ridge = [u32::MAX; 2];
+            let others = face[..D - 1].iter().enumerate().filter(|(k, _)| *k != left_out);
+            ridge.iter_mut().zip(others).for_each(|(slot, (_, &v))| *slot = v);
+            ridges.push((ridge, i as u32));
+        }
+    }
+    vertices.sort_unstable();
+    vertices.dedup();
+    ridges.sort_unstable();
+    let mut parents: Vec<u32> = (0..link.len() as u32).collect();
+    let root = |parents: &[u32], mut i: u32| {
+        while parents[i as usize] != i {
+            i = parents[i as usize];
+        }
+        i
+    };
+    let (mut pieces, mut distinct, mut open) = (link.len(), 0, 0);
+    for shared in ridges.chunk_by(|a, b| a.0 == b.0) {
+        distinct += 1;
+        match shared {
+            [_] => open += 1,
+            [a, b] => {
+                let (a, b) = (root(&parents, a.1), root(&parents, b.1));
+                if a != b {
+                    parents[a.max(b) as usize] = a.min(b);
+                    pieces -= 1;
+                }
+            }
+            _ => return false,
+        }
+    }
+    let euler = match D {
+        3 => return pieces == 1,
+        _ => vertices.len() as i64 - distinct as i64 + link.len() as i64,
+    };
+    pieces == 1 && euler == if open == 0 { 2 } else { 1 }
+}
+
 /// The corners of each simplex. Indices must be within `vertices`.
 pub fn corners<const D: usize>(
     vertices: &[Vector64<D>],
@@ -255,6 +333,31 @@ mod tests {
         simplices.extend([[2, 100, 0, 5], [5, 0, 100, 6], [5, 6, 7, 100]]);
         assert_eq!(components(&simplices), 1);
         assert_eq!((components::<3>(&[]), f_vector::<3>(&[])), (0, vec![0, 0, 0]));
+    }
+
+    #[test]
+    fn bodies_that_touch_are_singular_there() {
+        fn check<const D: usize>() {
+            let (_, simplices) = corner_boundary::<D>();
+            let n = D as u32 + 1;
+            assert_eq!(singular_vertices(&simplices), 0);
+            // With a rim.
+            assert_eq!(singular_vertices(&simplices[1..]), 0);
+            assert_eq!(singular_vertices(&simplices[2..]), 0);
+            // A second body shares 1 vertex with the first, then 2.
+            for shared in 1..=2 {
+                let mut both = simplices.clone();
+                both.extend(simplices.iter().map(|s| s.map(|v| if v < shared { v } else { v + n })));
+                assert_eq!(singular_vertices(&both), shared as usize);
+            }
+            assert_eq!(singular_vertices::<D>(&[]), 0);
+        }
+        check::<3>();
+        check::<4>();
+        // Around this vertex is a torus of 7 vertices (Császár's): every facet is paired, and yet no manifold.
+        let torus: Vec<[u32; 4]> =
+            (0..7u32).flat_map(|i| [[i, (i + 1) % 7, (i + 3) % 7, 7], [i, (i + 3) % 7, (i + 2) % 7, 7]]).collect();
+        assert_eq!(singular_vertices(&torus), 1);
     }
 
     #[test]

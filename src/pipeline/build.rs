@@ -5,7 +5,7 @@ use super::plan::{CameraPlan, Plan, ProjectionPlan, SceneCounts, ScenePlan};
 use crate::geometry::Vector64;
 use crate::mesh::{Mesh, MeshBuilder, Orientation};
 use crate::render::{Camera, Projection, View};
-use crate::scene::{self, build_object};
+use crate::scene::{self, build_object_with_notes};
 
 /// A mesh of either dimension.
 #[derive(Clone, Debug)]
@@ -17,14 +17,14 @@ pub enum AnyMesh {
 }
 
 impl AnyMesh {
-    /// Builds a scene of the plan.
+    /// Builds a scene of the plan. What is worth telling of its objects goes into `notes`.
     ///
     /// # Errors
     /// Whatever is wrong with an object, at the key to blame.
-    pub fn build(plan: &Plan, scene: usize) -> Result<Self, Invalid> {
+    pub fn build(plan: &Plan, scene: usize, notes: &mut Vec<String>) -> Result<Self, Invalid> {
         match plan.scenes[scene].dimension {
-            3 => build(plan, scene).map(Self::Three),
-            _ => build(plan, scene).map(Self::Four),
+            3 => build(plan, scene, notes).map(Self::Three),
+            _ => build(plan, scene, notes).map(Self::Four),
         }
     }
 
@@ -57,8 +57,8 @@ pub fn camera<const D: usize>(plan: &CameraPlan) -> Result<Camera<D>, crate::ren
 }
 
 /// Builds a scene: each object's surface, one after the other, into one mesh.
-pub fn build<const D: usize>(plan: &Plan, scene: usize) -> Result<Mesh<D>, Invalid> {
-    let ScenePlan { path, objects, .. } = &plan.scenes[scene];
+pub fn build<const D: usize>(plan: &Plan, scene: usize, notes: &mut Vec<String>) -> Result<Mesh<D>, Invalid> {
+    let ScenePlan { path, objects, id, .. } = &plan.scenes[scene];
     let mut builder = MeshBuilder::<D>::new();
     for (i, object) in objects.iter().enumerate() {
         let here = format!("{path}.objects[{i}]");
@@ -70,7 +70,10 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize) -> Result<Mesh<D>, Inval
             let (key, message) = (error.key(), error.to_string());
             refuse(key, message.strip_prefix(&format!("{key}: ")).unwrap_or(&message).to_owned())
         };
-        let surface = build_object::<D>(object, &plan.folder).map_err(blame)?;
+        let name = object.name.clone().unwrap_or_else(|| format!("object {}", i + 1));
+        let mut told = Vec::new();
+        let surface = build_object_with_notes::<D>(object, &plan.folder, &mut told).map_err(blame)?;
+        notes.extend(told.into_iter().map(|note| format!("scene {id}, {name}: {note}")));
         let open = match object.orientation {
             scene::Orientation::Input => Orientation::Input,
             scene::Orientation::Eye => match plan.renders.iter().find(|r| r.scene == scene) {
@@ -84,7 +87,6 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize) -> Result<Mesh<D>, Inval
                 }
             },
         };
-        let name = object.name.clone().unwrap_or_else(|| format!("object {}", i + 1));
         let color = object.color.rgb().map_err(blame)?;
         builder.add(&name, color, &surface, open).map_err(|e| refuse("", e.to_string()))?;
     }

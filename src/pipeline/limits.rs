@@ -8,6 +8,7 @@ use super::spec::{Compression, Encoding};
 use super::work::Stale;
 use crate::export;
 use crate::render::{Channel, Fragment};
+use crate::volume::available_memory;
 
 /// Refuses a run whose files don't fit on the disk, or one layer of whose pictures doesn't fit in memory.
 ///
@@ -68,11 +69,4 @@ fn disk(plan: &Plan, stale: &Stale, index: usize) -> u64 {
 fn bytes(plan: &Plan, render: &RenderPlan, channel: Channel) -> u64 {
     let bytes = if plan.scenes[render.scene].dimension == 3 { channel.bytes::<3>() } else { channel.bytes::<4>() };
     bytes as u64
-}
-
-/// Bytes of memory that can be had without swapping, where the system says so.
-fn available_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib.saturating_mul(1024))
 }

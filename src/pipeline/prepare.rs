@@ -15,6 +15,8 @@ pub struct Prepared {
     pub meshes: Vec<Option<AnyMesh>>,
     /// The values of each occlusion that is loaded from a file, if its scene was asked for.
     pub loaded: Vec<Option<Loaded>>,
+    /// What is allowed but worth telling of the scenes' objects.
+    pub notes: Vec<String>,
 }
 
 /// An occlusion that was computed before.
@@ -47,9 +49,9 @@ impl Pipeline {
 }
 
 fn prepare(plan: &Plan, wanted: impl Fn(usize) -> bool) -> Result<Prepared, Invalid> {
-    let mut meshes = Vec::with_capacity(plan.scenes.len());
+    let (mut meshes, mut notes) = (Vec::with_capacity(plan.scenes.len()), Vec::new());
     for scene in 0..plan.scenes.len() {
-        meshes.push(if wanted(scene) { Some(AnyMesh::build(plan, scene)?) } else { None });
+        meshes.push(if wanted(scene) { Some(AnyMesh::build(plan, scene, &mut notes)?) } else { None });
     }
     let mut loaded = Vec::with_capacity(plan.occlusions.len());
     for occlusion in &plan.occlusions {
@@ -61,7 +63,7 @@ fn prepare(plan: &Plan, wanted: impl Fn(usize) -> bool) -> Result<Prepared, Inva
             _ => None,
         });
     }
-    Ok(Prepared { meshes, loaded })
+    Ok(Prepared { meshes, loaded, notes })
 }
 
 /// The sidecar's path: `NAME.f32.yaml` beside `NAME.f32`.

@@ -100,12 +100,12 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     progress.begin("scene", 0);
     let prepared = pipeline.prepare(|scene| stale.scene(plan, scene));
     progress.end();
-    let Prepared { meshes, loaded } = prepared?;
+    let Prepared { meshes, loaded, notes } = prepared?;
     if stale.anything() {
         export::check_writable(&plan.out)?;
     }
     let building = began.elapsed();
-    let report = Report { out: plan.out.clone(), ..Report::default() };
+    let report = Report { out: plan.out.clone(), notes, ..Report::default() };
     let opencl = opencl.as_ref();
     let mut run = Run { plan, opencl, keys, cache, stale, loaded, progress, report, times: BTreeMap::new() };
     for (scene, mesh) in meshes.into_iter().enumerate() {

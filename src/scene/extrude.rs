@@ -9,7 +9,9 @@
 //!
 //! (see [`super::product`]): walls over its boundary triangles, and the solid itself as the two caps. With t tetrahedra,
 //! f boundary triangles and m layers that makes 2 t + 3 m f tetrahedra. The surface of a closed triangle mesh sweeps walls
-//! only, which are open at both ends; its caps would need the inside meshed.
+//! only, which are open at both ends, unless caps are asked for: then its inside is cut into tetrahedra ([`super::fill`]).
+//!
+//! A motion moves, turns and scales the mesh from layer to layer: the surface is then that of a moving body in spacetime.
 //!
 //! Points with identical coordinates are one. Tetrahedra of a file may have either orientation; triangles are taken as
 //! they are, so that walls face outwards if the triangles do.
@@ -20,10 +22,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
+use super::fill::fill;
 use super::lattice::compact;
 use super::numbers::{check_count, finite, point};
 use super::product::Chain;
 use super::readers::{Cells, Input};
+use super::transform::{self, TransformStep};
 use super::weld::weld;
 use crate::geometry::{Vector64, determinant};
 use crate::mesh::Surface;
@@ -32,13 +36,15 @@ use crate::mesh::Surface;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExtrudeSpec {
-    /// The mesh: triangles (`.stl`, `.ply`, `.vtu`) or tetrahedra (`.vtu`). Relative to the pipeline's folder.
+    /// The mesh: triangles (`.stl`, `.obj`, `.ply`, `.msh`, `.vtk`, `.vtu`) or tetrahedra (`.vtu`, `.vtk`,
+    /// `.msh`). Relative to the pipeline's folder.
     pub mesh: PathBuf,
     /// Where the sweep begins along the direction.
     pub from: f64,
     /// Where it ends.
     pub to: f64,
-    /// Whether to close both ends. Tetrahedra can be, and are if this is left out; triangles can't be yet.
+    /// Whether to close both ends. Tetrahedra are closed if this is left out. The inside of a closed surface of triangles
+    /// is cut into tetrahedra if this is `true`, which divides the triangles as well; else they sweep walls only.
     #[serde(default)]
     pub caps: Option<bool>,
     /// Layers of prisms between both ends; 1 if left out.
@@ -48,6 +54,10 @@ pub struct ExtrudeSpec {
     /// What the mesh is swept along; `[0, 0, 0, 1]`, the fourth axis, if left out. The last number must not be 0.
     #[serde(default)]
     pub direction: Option<Vec<f64>>,
+    /// What the mesh does on its way, little by little from where it is to all of it at the end: steps as in
+    /// `transform`, in three dimensions, with factors above 0. Give enough `layers`.
+    #[serde(default)]
+    pub motion: Vec<TransformStep>,
 }
 
 fn one() -> u32 {
@@ -75,19 +85,23 @@ impl ExtrudeSpec {
             let message = "the last number is 0: the mesh would be swept within its own space, not out of it";
             return Err(Error::invalid("extrude.direction", message));
         }
+        self.check_motion()?;
         let input = Input::new("extrude.mesh", folder, &self.mesh);
         let mesh = input.read()?;
         let swept = match mesh.cells {
             Cells::Triangles(triangles) => {
-                if self.caps == Some(true) {
-                    let message = "caps need the solid meshed, and this mesh is of triangles; \
-                                   give a tetrahedral mesh (.vtu) or write caps: false";
-                    return Err(Error::invalid("extrude.caps", message));
-                }
                 let (points, triangles) = weld(&mesh.points, triangles);
-                self.check_size(points.len(), 0, triangles.len())?;
-                let triangles = Chain::of(points.len() as u32, &triangles);
-                Swept { points, chain: triangles.times(&Chain::interval(self.layers)) }
+                let interval = Chain::interval(self.layers);
+                if self.caps == Some(true) {
+                    let (points, tetrahedra) = fill(&points, &triangles).map_err(|message| input.wrong(message))?;
+                    let solid = Chain::of(points.len() as u32, &tetrahedra);
+                    self.check_size(points.len(), solid.len(), solid.boundary().len())?;
+                    Swept { points, chain: solid.boundary_of_product(&interval) }
+                } else {
+                    self.check_size(points.len(), 0, triangles.len())?;
+                    let triangles = Chain::of(points.len() as u32, &triangles);
+                    Swept { points, chain: triangles.times(&interval) }
+                }
             }
             Cells::Tetrahedra(tetrahedra) => {
                 let (points, tetrahedra) = weld(&mesh.points, tetrahedra);
@@ -104,7 +118,33 @@ impl ExtrudeSpec {
         };
         // Swept against the direction in which w grows, the product has the other handedness.
         let inside_out = (to < from) != (direction[D - 1] < 0.0);
-        Ok(swept.place(self.layers, from, to, &direction, inside_out))
+        let layers = self.moved(&swept.points)?;
+        Ok(swept.place(&layers, from, to, &direction, inside_out))
+    }
+
+    /// Refuses what would turn the mesh inside out on its way, and what can't be in three dimensions.
+    fn check_motion(&self) -> Result<(), Error> {
+        for (i, step) in self.motion.iter().enumerate() {
+            let key = format!("extrude.motion.{i}.scale");
+            let factors = step.scale.as_ref().map(|factors| factors.each::<3>(&key)).transpose()?.unwrap_or([1.0; 3]);
+            if let Some(factor) = factors.iter().find(|factor| **factor <= 0.0) {
+                let message = format!("{factor} is not above 0: the mesh would shrink to nothing on its way");
+                return Err(Error::invalid(key, message));
+            }
+        }
+        transform::apply::<3>("extrude.motion", &self.motion, &mut Surface::default())
+    }
+
+    /// The points in each layer.
+    fn moved(&self, points: &[Vector64<3>]) -> Result<Vec<Vec<Vector64<3>>>, Error> {
+        (0..=self.layers)
+            .map(|layer| {
+                let share = f64::from(layer) / f64::from(self.layers);
+                let steps: Vec<TransformStep> = self.motion.iter().map(|step| step.part(share)).collect();
+                let mut surface = Surface { vertices: points.to_vec(), ..Surface::default() };
+                transform::apply("extrude.motion", &steps, &mut surface).map(|()| surface.vertices)
+            })
+            .collect()
     }
 
     fn check_size(&self, points: usize, tetrahedra: usize, walls: usize) -> Result<(), Error> {
@@ -126,7 +166,7 @@ struct Swept {
 impl Swept {
     fn place<const D: usize>(
         self,
-        layers: u32,
+        layers: &[Vec<Vector64<3>>],
         from: f64,
         to: f64,
         direction: &Vector64<D>,
@@ -138,12 +178,13 @@ impl Swept {
         if inside_out {
             simplices.iter_mut().for_each(|simplex| simplex.swap(D - 2, D - 1));
         }
+        let last = layers.len() - 1;
         let place = |pair: u32| {
-            let (point, layer) = (pair / (layers + 1), pair % (layers + 1));
-            let share = f64::from(layer) / f64::from(layers);
+            let (point, layer) = (pair as usize / layers.len(), pair as usize % layers.len());
+            let share = layer as f64 / last as f64;
             // Both ends are exact.
-            let along = if layer == layers { to } else { from + (to - from) * share };
-            let point = self.points[point as usize];
+            let along = if layer == last { to } else { from + (to - from) * share };
+            let point = layers[layer][point];
             Vector64::from_fn(|row, _| if row < 3 { point[row] } else { 0.0 } + direction[row] * along)
         };
         Surface { vertices: used.into_iter().map(place).collect(), simplices, normals: None }
@@ -151,7 +192,7 @@ impl Swept {
 }
 
 /// The solid, every tetrahedron oriented positively, with a boundary that makes sense.
-fn solid(points: &[Vector64<3>], mut tetrahedra: Vec<[u32; 4]>) -> Result<Chain, String> {
+pub(super) fn solid(points: &[Vector64<3>], mut tetrahedra: Vec<[u32; 4]>) -> Result<Chain, String> {
     for (i, tetrahedron) in tetrahedra.iter_mut().enumerate() {
         let [a, b, c, d] = tetrahedron.map(|i| points[i as usize]);
         let volume = determinant(&[b - a, c - a, d - a]);

@@ -1,4 +1,4 @@
-//! A surface from a file: in 4D a `.vtu` of tetrahedra, in 3D triangles from `.stl`, `.ply` or `.vtu`.
+//! A surface from a file: in 4D a `.vtu` of tetrahedra, in 3D triangles from any mesh file that is read.
 //!
 //! A VTK file's points have three coordinates, so those of a 4D surface are in a point array of four components named
 //! `position`, as this program writes them. In 3D such an array, of three components, wins over the points as well. A point

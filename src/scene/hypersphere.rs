@@ -6,6 +6,8 @@
 //! unit cubes fits exactly. Facets that meet share the order of the axes and so the triangulation. Vertices are then
 //! moved along their ray onto the sphere. 4D: 16 n^3 tetrahedra over (8 n^3 + 16 n) / 3 vertices; 3D: 8 n^2 triangles over
 //! 4 n^2 + 2 vertices. Closed, facing outwards; n = 18 in 4D is the test scene of NTracer (93,312 tetrahedra).
+//!
+//! Made from the 600-cell instead (see [`super::polytope`]), the tetrahedra are closer to regular.
 
 use std::collections::HashMap;
 
@@ -14,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::numbers::{check_count, point, positive};
+use super::polytope;
 use crate::geometry::{Vector64, determinant};
 use crate::mesh::Surface;
 
@@ -29,6 +32,22 @@ pub struct SphereSpec {
     /// Pieces along every edge of the cross-polytope it is made from: 16 n^3 tetrahedra in 4D, 8 n^2 triangles in 3D.
     #[schemars(range(min = 1))]
     pub subdivisions: u32,
+    /// What it is made from: the 16-cell (3D: the octahedron), if left out, or in 4D the 600-cell, which makes
+    /// 600 n^3 tetrahedra of better and more equal shape.
+    #[serde(default)]
+    pub from: Base,
+}
+
+/// What a sphere is made from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Base {
+    /// The cross-polytope: the 16-cell, in 3D the octahedron.
+    #[default]
+    #[serde(rename = "16-cell")]
+    Cell16,
+    /// The 600-cell.
+    #[serde(rename = "600-cell")]
+    Cell600,
 }
 
 impl SphereSpec {
@@ -43,8 +62,23 @@ impl SphereSpec {
         if self.subdivisions == 0 {
             return Err(Error::invalid(key, "0 subdivisions; the least is 1"));
         }
-        check_count(&key, (1 << D) * u128::from(self.subdivisions).pow(D as u32 - 1))?;
-        let mut surface = cross_polytope::<D>(self.subdivisions as i32);
+        let pieces = u128::from(self.subdivisions).pow(D as u32 - 1);
+        let mut surface = match self.from {
+            Base::Cell16 => {
+                check_count(&key, (1 << D) * pieces)?;
+                cross_polytope::<D>(self.subdivisions as i32)
+            }
+            Base::Cell600 if D == 4 => {
+                check_count(&key, 600 * pieces)?;
+                polytope::regular::<D>(polytope::Cells::Cell600, self.subdivisions)
+            }
+            Base::Cell600 => {
+                return Err(Error::invalid(
+                    format!("{shape}.from"),
+                    "a sphere of dimension 3 is made from 16-cell only",
+                ));
+            }
+        };
         for vertex in &mut surface.vertices {
             *vertex = center + *vertex * (radius / vertex.norm());
         }
@@ -78,7 +112,7 @@ fn cross_polytope<const D: usize>(n: i32) -> Surface<D> {
 }
 
 /// The facet x >= 0, sum x = n, in n^(D-1) simplices.
-fn standard_facet<const D: usize>(n: i32) -> Vec<[[i32; D]; D]> {
+pub(super) fn standard_facet<const D: usize>(n: i32) -> Vec<[[i32; D]; D]> {
     let mut simplices = Vec::new();
     let mut corner = [0; D];
     // Only the first D - 1 entries of `corner` and of an order are used: y_1 to y_(D-1).

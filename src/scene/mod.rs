@@ -9,9 +9,12 @@
 //! | `simplices` | vertices and simplices as listed | - |
 //! | `file` | a surface from a file | [`readers`] |
 //! | `box`, `tesseract` | boundary of a product of intervals | [`product`] |
-//! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`] |
+//! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`], `fill` |
 //! | `cut_cube` | a box minus boxes | [`lattice`] |
 //! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
+//! | `spin` | a 3D mesh turned round in a plane with w | [`readers`], [`product`] |
+//! | `polytope` | one of the six regular polytopes | - |
+//! | `duoprism`, `duocylinder`, `spherinder`, `cubinder` | boundary of a product of two solids | [`product`] |
 //! | `isosurface` | where a formula or a grid of values passes a value | [`isosurface`] |
 //!
 //! [`build_object`] checks everything that can be wrong with an object, so whoever checks a pipeline builds its scene.
@@ -19,17 +22,22 @@
 mod color;
 mod cuboid;
 mod cut_cube;
+mod disc;
 mod error;
 mod extrude;
 mod file;
+mod fill;
 mod hypersphere;
 pub mod isosurface;
 pub mod lattice;
 mod numbers;
 mod object;
+pub mod polytope;
 pub mod product;
+mod products;
 pub mod readers;
 mod simplices;
+mod spin;
 mod transform;
 mod weld;
 
@@ -38,9 +46,12 @@ pub use cuboid::{BoxSpec, TesseractSpec};
 pub use cut_cube::{CutCubeSpec, CutSpec};
 pub use error::Error;
 pub use extrude::ExtrudeSpec;
-pub use hypersphere::SphereSpec;
+pub use hypersphere::{Base, SphereSpec};
 pub use isosurface::IsosurfaceSpec;
 pub use numbers::{MAX_SIMPLICES, OneOrEach};
-pub use object::{ObjectSpec, Orientation, Shape, build_object};
+pub use object::{ObjectSpec, Orientation, Shape, build_object, build_object_with_notes};
+pub use polytope::PolytopeSpec;
+pub use products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 pub use simplices::SimplicesSpec;
+pub use spin::SpinSpec;
 pub use transform::{RotateSpec, TransformStep};

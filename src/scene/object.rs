@@ -12,7 +12,10 @@ use super::extrude::ExtrudeSpec;
 use super::hypersphere::SphereSpec;
 use super::isosurface::IsosurfaceSpec;
 use super::numbers::AXES;
+use super::polytope::PolytopeSpec;
+use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
+use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
 use crate::mesh::Surface;
@@ -27,7 +30,8 @@ pub struct ObjectSpec {
     /// Shape: vertices and simplices listed here.
     #[serde(default)]
     pub simplices: Option<SimplicesSpec>,
-    /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.ply`, `.vtu` in 3D.
+    /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.obj`, `.ply`,
+    /// `.msh`, `.vtk`, `.vtu` in 3D.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// Shape: a three-dimensional mesh swept along the fourth axis.
@@ -51,6 +55,24 @@ pub struct ObjectSpec {
     /// Shape: where a field, given by a formula or by a grid of values, passes a value.
     #[serde(default)]
     pub isosurface: Option<IsosurfaceSpec>,
+    /// Shape: a three-dimensional mesh turned round in a plane with w.
+    #[serde(default)]
+    pub spin: Option<SpinSpec>,
+    /// Shape: a regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell.
+    #[serde(default)]
+    pub polytope: Option<PolytopeSpec>,
+    /// Shape: the product of two regular polygons.
+    #[serde(default)]
+    pub duoprism: Option<DuoprismSpec>,
+    /// Shape: the product of two discs.
+    #[serde(default)]
+    pub duocylinder: Option<DuocylinderSpec>,
+    /// Shape: the product of a ball and an interval.
+    #[serde(default)]
+    pub spherinder: Option<SpherinderSpec>,
+    /// Shape: the product of a disc and a rectangle.
+    #[serde(default)]
+    pub cubinder: Option<CubinderSpec>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -94,6 +116,18 @@ pub enum Shape<'a> {
     Sphere(&'a SphereSpec),
     /// Where a field passes a value.
     Isosurface(&'a IsosurfaceSpec),
+    /// A three-dimensional mesh turned round in a plane with w.
+    Spin(&'a SpinSpec),
+    /// A regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell.
+    Polytope(&'a PolytopeSpec),
+    /// The product of two regular polygons.
+    Duoprism(&'a DuoprismSpec),
+    /// The product of two discs.
+    Duocylinder(&'a DuocylinderSpec),
+    /// The product of a ball and an interval.
+    Spherinder(&'a SpherinderSpec),
+    /// The product of a disc and a rectangle.
+    Cubinder(&'a CubinderSpec),
 }
 
 impl Shape<'_> {
@@ -109,20 +143,28 @@ impl Shape<'_> {
             Shape::Hypersphere(_) => "hypersphere",
             Shape::Sphere(_) => "sphere",
             Shape::Isosurface(_) => "isosurface",
+            Shape::Spin(_) => "spin",
+            Shape::Polytope(_) => "polytope",
+            Shape::Duoprism(_) => "duoprism",
+            Shape::Duocylinder(_) => "duocylinder",
+            Shape::Spherinder(_) => "spherinder",
+            Shape::Cubinder(_) => "cubinder",
         }
     }
 
-    /// The file it is read from, as the pipeline names it.
-    pub fn input_file(&self) -> Option<&Path> {
+    /// The files it is read from, as the pipeline names them.
+    pub fn input_files(&self) -> Vec<&Path> {
         match self {
-            Shape::File(path) => Some(path),
-            Shape::Extrude(spec) => Some(&spec.mesh),
-            _ => None,
+            Shape::File(path) => vec![path],
+            Shape::Extrude(spec) => vec![&spec.mesh],
+            Shape::Spin(spec) => vec![&spec.mesh],
+            Shape::Isosurface(spec) => spec.input_files(),
+            _ => Vec::new(),
         }
     }
 
     /// The surface, before it is placed.
-    fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
+    fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
             Shape::File(path) => file::build(path, folder),
@@ -135,7 +177,13 @@ impl Shape<'_> {
                 Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
             }
             Shape::Sphere(spec) => spec.build("sphere"),
-            Shape::Isosurface(spec) => spec.build(),
+            Shape::Isosurface(spec) => spec.build(folder, notes),
+            Shape::Spin(spec) => spec.build(folder),
+            Shape::Polytope(spec) => spec.build(),
+            Shape::Duoprism(spec) => spec.build(),
+            Shape::Duocylinder(spec) => spec.build(),
+            Shape::Spherinder(spec) => spec.build(),
+            Shape::Cubinder(spec) => spec.build(),
         }
     }
 }
@@ -153,6 +201,12 @@ impl ObjectSpec {
             self.hypersphere.as_ref().map(Shape::Hypersphere),
             self.sphere.as_ref().map(Shape::Sphere),
             self.isosurface.as_ref().map(Shape::Isosurface),
+            self.spin.as_ref().map(Shape::Spin),
+            self.polytope.as_ref().map(Shape::Polytope),
+            self.duoprism.as_ref().map(Shape::Duoprism),
+            self.duocylinder.as_ref().map(Shape::Duocylinder),
+            self.spherinder.as_ref().map(Shape::Spherinder),
+            self.cubinder.as_ref().map(Shape::Cubinder),
         ];
         let mut given = shapes.into_iter().flatten();
         match (given.next(), given.next()) {
@@ -164,7 +218,7 @@ impl ObjectSpec {
             _ => Err(Error::invalid(
                 "",
                 "the object has no shape; give it one of simplices, file, extrude, cut_cube, box, tesseract, \
-                 hypersphere, sphere, isosurface",
+                 hypersphere, sphere, isosurface, spin, polytope, duoprism, duocylinder, spherinder, cubinder",
             )),
         }
     }
@@ -172,10 +226,19 @@ impl ObjectSpec {
 
 /// The object's surface where the scene has it. Paths are relative to `folder`.
 pub fn build_object<const D: usize>(spec: &ObjectSpec, folder: &Path) -> Result<Surface<D>, Error> {
+    build_object_with_notes(spec, folder, &mut Vec::new())
+}
+
+/// The same; what is allowed but worth telling is added to `notes`, each beginning with the key it is about.
+pub fn build_object_with_notes<const D: usize>(
+    spec: &ObjectSpec,
+    folder: &Path,
+    notes: &mut Vec<String>,
+) -> Result<Surface<D>, Error> {
     let shape = spec.shape()?;
     spec.color.rgb()?;
-    let mut surface = shape.build::<D>(folder)?;
-    transform::apply(&spec.transform, &mut surface)?;
+    let mut surface = shape.build::<D>(folder, notes)?;
+    transform::apply("transform", &spec.transform, &mut surface)?;
     // Coordinates are rounded to single precision afterwards and must survive that.
     let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);
     if let Some((i, vertex)) = surface.vertices.iter().enumerate().find(|(_, vertex)| vertex.iter().any(too_large)) {

@@ -43,10 +43,25 @@ pub struct RotateSpec {
     pub center: Option<Vec<f64>>,
 }
 
-/// Applies the steps to the surface, in order.
-pub fn apply<const D: usize>(steps: &[TransformStep], surface: &mut Surface<D>) -> Result<(), Error> {
+impl TransformStep {
+    /// A share of the step, from 0 (nothing) to 1 (all of it).
+    pub fn part(&self, share: f64) -> Self {
+        let factor = |factor: &f64| 1.0 + (factor - 1.0) * share;
+        Self {
+            scale: self.scale.as_ref().map(|factors| match factors {
+                OneOrEach::One(one) => OneOrEach::One(factor(one)),
+                OneOrEach::Each(list) => OneOrEach::Each(list.iter().map(factor).collect()),
+            }),
+            rotate: self.rotate.as_ref().map(|r| RotateSpec { degrees: r.degrees * share, ..r.clone() }),
+            translate: self.translate.as_ref().map(|list| list.iter().map(|x| x * share).collect()),
+        }
+    }
+}
+
+/// Applies the steps, which are at this key, to the surface, in order.
+pub fn apply<const D: usize>(key: &str, steps: &[TransformStep], surface: &mut Surface<D>) -> Result<(), Error> {
     for (i, step) in steps.iter().enumerate() {
-        let key = format!("transform.{i}");
+        let key = format!("{key}.{i}");
         match (&step.scale, &step.rotate, &step.translate) {
             (Some(factors), None, None) => scale(surface, factors.each(&format!("{key}.scale"))?, &key)?,
             (None, Some(rotation), None) => rotate(surface, rotation, &format!("{key}.rotate"))?,

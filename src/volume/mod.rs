@@ -9,12 +9,14 @@
 mod array;
 pub mod compare;
 mod error;
+mod memory;
 pub mod vtk;
 
 use std::path::Path;
 
 pub use array::{Array, Kind, Values};
 pub use error::{Error, Problem};
+pub use memory::available_memory;
 
 /// Dimensions and placement of an image. Voxel centres are the grid's points.
 #[derive(Clone, Copy, Debug, PartialEq)]

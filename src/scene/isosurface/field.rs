@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::Error;
 use super::super::numbers::{finite, positive};
+use super::image::ImageSpec;
 
 /// The field whose isosurface is taken: exactly one of these.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,6 +27,8 @@ pub enum Field {
     /// cos, tan, asin, acos, atan, sinh, cosh, tanh, exp, ln, floor, min, max, atan2 and mod. `max(a, b)` of two bodies is
     /// what they have in common, `min(a, b)` both together, `max(a, -b)` the first without the second.
     Formula(String),
+    /// A grid of values from a file.
+    Image(Box<ImageSpec>),
     /// A sphere around the origin.
     Hypersphere(RoundSpec),
     /// Circles around a product of two circles, one in the plane xy and one in zw.
@@ -107,6 +110,7 @@ impl Field {
     pub fn key(&self) -> &'static str {
         match self {
             Field::Formula(_) => "formula",
+            Field::Image(_) => "image",
             Field::Hypersphere(_) => "hypersphere",
             Field::Tiger(_) => "tiger",
             Field::Torisphere(_) => "torisphere",
@@ -121,7 +125,7 @@ impl Field {
     pub fn define(&self, dimension: usize) -> Result<Definition, Error> {
         let path = |key: &str| format!("isosurface.field.{}{}{key}", self.key(), if key.is_empty() { "" } else { "." });
         let fits = match self {
-            Field::Formula(_) | Field::Hypersphere(_) | Field::Gyroid(_) => true,
+            Field::Formula(_) | Field::Image(_) | Field::Hypersphere(_) | Field::Gyroid(_) => true,
             Field::Torus(_) => dimension == 3,
             _ => dimension == 4,
         };
@@ -132,6 +136,7 @@ impl Field {
         let radius = |key: &str, value: f64| positive(&path(key), value);
         let (formula, extent) = match self {
             Field::Formula(text) => (text.clone(), None),
+            Field::Image(_) => return Err(Error::invalid(path(""), "is no formula")),
             Field::Hypersphere(RoundSpec { radius: r }) => {
                 let r = radius("radius", *r)?;
                 let squares = if dimension == 3 { "x^2 + y^2 + z^2" } else { "x^2 + y^2 + z^2 + w^2" };

@@ -1,7 +1,7 @@
 //! Isosurfaces: where a field, given by a formula or as a grid of values, passes a value.
 //!
 //! [`table`] says what the surface is within one cell of a grid, [`march`] goes over all cells, [`field`] and `expression`
-//! make fields of formulas. For D = 4 that is marching hypercubes, for D = 3 marching cubes. The surface
+//! make fields of formulas, [`image`] of files. For D = 4 that is marching hypercubes, for D = 3 marching cubes. The surface
 //! is piecewise linear and converges with the square of the cells' size. Around the grid is nothing, if `pad` is not
 //! switched off, so that a body that reaches beyond the grid is cut off flat there, a fiftieth of a cell outside of it, and
 //! the surface is closed in any case.
@@ -9,8 +9,11 @@
 mod components;
 mod expression;
 pub mod field;
+pub mod image;
 pub mod march;
 pub mod table;
+
+use std::path::Path;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -18,14 +21,19 @@ use serde::{Deserialize, Serialize};
 
 use self::expression::{Expression, Rows};
 use self::field::Field;
+use self::image::ImageSpec;
 use self::march::{Layers, Stop};
 use super::Error;
 use super::lattice::divide;
-use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, check_count, finite};
+use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, finite};
 use crate::mesh::Surface;
+use crate::volume::available_memory;
 
-/// The most points a layer of a grid may have: three layers are held in memory.
+/// The most points a layer of a grid may have: a few layers are held in memory.
 const MOST_IN_LAYER: u128 = 1 << 27;
+
+/// Bytes that a point of a layer takes while the grid is gone over: as it is read, cropped, smoothed and marched on.
+const BYTES_IN_LAYER: u128 = 40;
 
 /// The most points of a grid: more would take minutes only to look at.
 const MOST_POINTS: u128 = 1 << 33;
@@ -36,12 +44,13 @@ const MOST_POINTS: u128 = 1 << 33;
 pub struct IsosurfaceSpec {
     /// The field.
     pub field: Field,
-    /// Where the field is looked at.
-    pub grid: GridSpec,
-    /// The value that the surface is at; 0 if left out.
+    /// Where a formula is looked at. An image brings its own grid.
+    #[serde(default)]
+    pub grid: Option<GridSpec>,
+    /// The value that the surface is at; 0 if left out. An image needs one.
     #[serde(default)]
     pub isovalue: Option<f64>,
-    /// Which side of the isovalue is solid; `below` if left out.
+    /// Which side of the isovalue is solid; if left out `below` for formulas and `above` for images.
     #[serde(default)]
     pub inside: Option<Side>,
     /// Whether to close the surface where it leaves the grid; yes if left out.
@@ -81,17 +90,64 @@ pub struct GridSpec {
 }
 
 impl IsosurfaceSpec {
-    /// The surface.
-    pub fn build<const D: usize>(&self) -> Result<Surface<D>, Error> {
+    /// The files it is read from, as the pipeline names them.
+    pub fn input_files(&self) -> Vec<&Path> {
+        match &self.field {
+            Field::Image(image) => image.files().collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The surface. Files are relative to `folder`. Where the field never passes the isovalue there is none, or only the
+    /// grid's own border; `notes` say so, and how many values are no numbers.
+    pub fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
+        match &self.field {
+            Field::Image(image) => self.of_image(image, folder, notes),
+            _ => self.of_formula(notes),
+        }
+    }
+
+    fn of_image<const D: usize>(
+        &self,
+        image: &ImageSpec,
+        folder: &Path,
+        notes: &mut Vec<String>,
+    ) -> Result<Surface<D>, Error> {
+        if self.grid.is_some() {
+            let message = "an image has a grid of its own; place it by spacing and origin, or take a part by crop";
+            return Err(Error::invalid("isosurface.grid", message));
+        }
+        let Some(isovalue) = self.isovalue else {
+            return Err(Error::invalid("isosurface", "an image needs an isovalue: the value that the surface is at"));
+        };
+        let isovalue = finite("isosurface.isovalue", isovalue)?;
+        let (mut layers, axes) = image.open::<D>(folder, isovalue, self.inside.unwrap_or(Side::Above))?;
+        check_grid("isosurface.field.image", &axes.each_ref().map(|axis| axis.len() as u128))?;
+        if let Some(axis) = axes.iter().position(|axis| axis.len() < 2).filter(|_| !self.pad) {
+            let message = format!("the image has one point along {}; it needs two, or pad: true", AXES[axis]);
+            return Err(Error::invalid("isosurface.pad", message));
+        }
+        let backwards = axes.iter().filter(|axis| axis.len() > 1 && axis[1] < axis[0]).count();
+        let mut surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut layers);
+        if let (Ok(surface), 1) = (&mut surface, backwards % 2) {
+            surface.simplices.iter_mut().for_each(|simplex| simplex.swap(D - 2, D - 1));
+        }
+        finish(surface, &layers.seen, isovalue, self.smallest_component, notes)
+    }
+
+    fn of_formula<const D: usize>(&self, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         let isovalue = finite("isosurface.isovalue", self.isovalue.unwrap_or(0.0))?;
         let inside = self.inside.unwrap_or(Side::Below);
         let definition = self.field.define(D)?;
         let formula_key = format!("isosurface.field.{}", self.field.key());
         let expression = Expression::parse(&definition.formula, &AXES[..D])
             .map_err(|message| Error::invalid(&formula_key, message))?;
+        let Some(grid) = &self.grid else {
+            return Err(Error::invalid("isosurface", "a formula needs a grid to be looked at on: give grid"));
+        };
         // A body grows by the isovalue, as its field is a distance.
         let reach = definition.extent.map(|extent| extent.map(|x| x + isovalue.max(0.0)));
-        let axes = self.grid.axes::<D>(reach)?;
+        let axes = grid.axes::<D>(reach)?;
         let mut sampled = Sampled {
             rows: expression.along(&axes[0]),
             axes: axes.clone(),
@@ -101,7 +157,7 @@ impl IsosurfaceSpec {
             seen: Seen::default(),
         };
         let surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut sampled);
-        finish(surface, &sampled.seen, isovalue, self.smallest_component)
+        finish(surface, &sampled.seen, isovalue, self.smallest_component, notes)
     }
 }
 
@@ -111,6 +167,7 @@ fn finish<const D: usize>(
     seen: &Seen,
     isovalue: f64,
     smallest: Option<u64>,
+    notes: &mut Vec<String>,
 ) -> Result<Surface<D>, Error> {
     let surface = match surface {
         Ok(surface) => surface,
@@ -123,14 +180,26 @@ fn finish<const D: usize>(
             return Err(Error::invalid("isosurface", message));
         }
     };
+    if seen.missing > 0 {
+        let (missing, all) = (seen.missing, seen.looked_at);
+        notes.push(format!("isosurface.field: {missing} of {all} values are no numbers; they count as outside"));
+    }
     if seen.inside == 0 || seen.outside == 0 {
-        let all = if seen.inside == 0 { "out" } else { "in" };
         let range = match seen.lowest <= seen.highest {
             true => format!("its values go from {} to {}", seen.lowest, seen.highest),
             false => "none of its values is a number".to_owned(),
         };
-        let message = format!("the field is {all}side everywhere: {range}, and the isovalue is {isovalue}");
-        return Err(Error::invalid("isosurface.isovalue", message));
+        let (all, rest) = match (seen.inside, surface.simplices.is_empty()) {
+            (0, _) => ("out", "there is no surface"),
+            (_, true) => ("in", "there is no surface"),
+            (_, false) => ("in", "the surface is that of the grid"),
+        };
+        notes.push(format!(
+            "isosurface.isovalue: the field is {all}side everywhere: {range}, and the isovalue is {isovalue}; {rest}"
+        ));
+        if surface.simplices.is_empty() {
+            return Ok(surface);
+        }
     }
     let surface = match smallest {
         None => surface,
@@ -178,7 +247,15 @@ fn check_grid<const D: usize>(key: &str, points: &[u128; D]) -> Result<(), Error
         );
         return Err(Error::invalid(key, message));
     }
-    check_count(key, 0)
+    if let Some(available) = available_memory().filter(|&n| layer * BYTES_IN_LAYER > u128::from(n)) {
+        let message = format!(
+            "a layer of the grid has {layer} points, which take {} bytes of memory, and {available} are free; \
+             take a part of it, or fewer points",
+            layer * BYTES_IN_LAYER
+        );
+        return Err(Error::invalid(key, message));
+    }
+    Ok(())
 }
 
 /// What was met of a field.
@@ -188,11 +265,14 @@ struct Seen {
     highest: f64,
     inside: u64,
     outside: u64,
+    /// Values that are no numbers, of how many that were looked at.
+    missing: u64,
+    looked_at: u64,
 }
 
 impl Default for Seen {
     fn default() -> Self {
-        Self { lowest: f64::INFINITY, highest: f64::NEG_INFINITY, inside: 0, outside: 0 }
+        Self { lowest: f64::INFINITY, highest: f64::NEG_INFINITY, inside: 0, outside: 0, missing: 0, looked_at: 0 }
     }
 }
 
@@ -203,19 +283,36 @@ impl Seen {
             highest: self.highest.max(other.highest),
             inside: self.inside + other.inside,
             outside: self.outside + other.outside,
+            missing: self.missing + other.missing,
+            looked_at: self.looked_at + other.looked_at,
         }
     }
 
     /// Notes a value, and returns how far it is inside.
     #[inline]
     fn look(&mut self, value: f64, isovalue: f64, sign: f64) -> f32 {
+        self.looked_at += 1;
+        self.missing += u64::from(value.is_nan());
         self.lowest = self.lowest.min(value);
         self.highest = self.highest.max(value);
         let depth = (sign * (value - isovalue)) as f32;
+        self.count(depth);
+        depth
+    }
+
+    /// Notes how far a value is inside.
+    fn look_at_depth(&mut self, depth: f32, isovalue: f64, sign: f64) {
+        let value = isovalue + sign * f64::from(depth);
+        self.lowest = self.lowest.min(value);
+        self.highest = self.highest.max(value);
+        self.count(depth);
+    }
+
+    #[inline]
+    fn count(&mut self, depth: f32) {
         let inside = depth >= 0.0;
         self.inside += u64::from(inside);
         self.outside += u64::from(!inside);
-        depth
     }
 }
 

@@ -1,17 +1,25 @@
-//! Meshes from files: triangles from `.stl` and `.ply`, triangles or tetrahedra from `.vtu`.
+//! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu`, `.vtk` and
+//! `.msh`. And [`image`]s.
 //!
 //! A file is read whole, so that declared sizes can be held against its length before anything is allocated. Whatever
 //! it holds, the answer is a mesh whose indices are within range and whose coordinates are finite, or an error that
 //! names the file and what is wrong with it. Orientation is that of the vertices' order; normals of STL files are ignored.
 
+pub mod image;
+mod msh;
+mod obj;
 mod ply;
 mod stl;
+mod vtk;
 mod vtu;
 
 use std::path::{Path, PathBuf};
 
 use super::Error;
 use crate::geometry::Vector64;
+
+/// Characters of a message about a file.
+const LONGEST_MESSAGE: usize = 500;
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,7 +86,13 @@ impl Input {
 
     /// The error that the file holds something wrong.
     pub fn wrong(&self, message: impl Into<String>) -> Error {
-        Error::Content { key: self.key.clone(), path: self.path.clone(), message: message.into() }
+        let mut message = message.into();
+        // Some readers cite what is damaged at length.
+        if let Some((end, _)) = message.char_indices().nth(LONGEST_MESSAGE) {
+            message.truncate(end);
+            message.push_str(" ...");
+        }
+        Error::Content { key: self.key.clone(), path: self.path.clone(), message }
     }
 
     fn unreadable(&self, source: std::io::Error) -> Error {
@@ -92,7 +106,14 @@ impl Input {
             "stl" => stl::read,
             "ply" => ply::read,
             "vtu" => vtu::read,
-            _ => return Err(self.wrong("can't tell what it holds; the name must end in .stl, .ply or .vtu")),
+            "vtk" => vtk::read,
+            "obj" => obj::read,
+            "msh" => msh::read,
+            _ => {
+                return Err(
+                    self.wrong("can't tell what it holds; the name must end in .stl, .obj, .ply, .msh, .vtk or .vtu")
+                );
+            }
         };
         let bytes = std::fs::read(&self.path).map_err(|source| self.unreadable(source))?;
         if bytes.is_empty() {

@@ -1,0 +1,151 @@
+//! Caps of extruded surfaces: the solid within is met exactly, whatever its form, and what has no inside is refused.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use ao4d::geometry::{Vector64, measure};
+use ao4d::mesh::Surface;
+use ao4d::mesh::topology::{corners, enclosed_volume, facet_pairs};
+use ao4d::scene::{ObjectSpec, build_object};
+use serde_json::{Value, json};
+
+fn build<const D: usize>(object: Value, folder: &Path) -> Result<Surface<D>, String> {
+    let spec: ObjectSpec = serde_json::from_value(object.clone()).unwrap_or_else(|e| panic!("{object}: {e}"));
+    build_object(&spec, folder).map_err(|error| error.to_string())
+}
+
+fn volume<const D: usize>(surface: &Surface<D>) -> f64 {
+    enclosed_volume(corners(&surface.vertices, &surface.simplices))
+}
+
+fn capped(surface: &Surface<3>) -> Result<Surface<4>, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut obj = String::new();
+    surface.vertices.iter().for_each(|v| writeln!(obj, "v {} {} {}", v[0], v[1], v[2]).unwrap());
+    surface.simplices.iter().for_each(|t| writeln!(obj, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap());
+    std::fs::write(folder.path().join("x.obj"), obj).unwrap();
+    build(json!({"extrude": {"mesh": "x.obj", "from": -1, "to": 1, "caps": true}}), folder.path())
+}
+
+/// Checks the body swept from a surface, and tells how many tetrahedra and points it has.
+fn check(name: &str, surface: &Surface<3>) -> (usize, usize) {
+    let body = capped(surface).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let pairs = facet_pairs(&body.simplices);
+    assert!(pairs.is_closed() && pairs.open == 0, "{name}: {pairs:?}");
+    let solid = volume(surface).abs();
+    assert!((volume(&body) / (2.0 * solid) - 1.0).abs() < 1e-11, "{name}: {} {}", volume(&body), 2.0 * solid);
+    // No part of a cap twice: the sizes of its tetrahedra, all counted as positive, make up the solid.
+    for end in [-1.0, 1.0] {
+        let cap: f64 = corners(&body.vertices, &body.simplices)
+            .filter(|simplex| simplex.iter().all(|v| v[3] == end))
+            .map(|simplex| measure(&simplex))
+            .sum();
+        assert!((cap / solid - 1.0).abs() < 1e-11, "{name}: {cap} {solid}");
+        // Its own vertices are all there.
+        let mut there: Vec<[u64; 3]> =
+            body.vertices.iter().filter(|v| v[3] == end).map(|v| [0, 1, 2].map(|i| (v[i] + 0.0).to_bits())).collect();
+        there.sort_unstable();
+        for v in &surface.vertices {
+            assert!(there.binary_search(&[0, 1, 2].map(|i| (v[i] + 0.0).to_bits())).is_ok(), "{name}: {v}");
+        }
+    }
+    (body.simplices.len(), body.vertices.len())
+}
+
+fn shape(object: Value) -> Surface<3> {
+    build(object, &Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/meshes")).unwrap()
+}
+
+/// Both surfaces as one, vertices apart.
+fn together(mut a: Surface<3>, b: &Surface<3>) -> Surface<3> {
+    let count = a.vertices.len() as u32;
+    a.vertices.extend(&b.vertices);
+    a.simplices.extend(b.simplices.iter().map(|t| t.map(|i| i + count)));
+    a
+}
+
+fn cube(low: f64, high: f64, subdivisions: u32) -> Surface<3> {
+    shape(json!({"box": {"min": [low, low, low], "max": [high, high, high], "subdivisions": subdivisions}}))
+}
+
+fn turned(mut surface: Surface<3>) -> Surface<3> {
+    surface.simplices.iter_mut().for_each(|t| t.swap(1, 2));
+    surface
+}
+
+#[test]
+fn solids_of_all_forms_are_filled() {
+    // Convex: no point has to be added.
+    assert_eq!(check("cube", &cube(0.0, 1.0, 1)), (12 * 3 + 2 * 6, 16));
+    check("cube that faces inwards", &turned(cube(0.0, 1.0, 1)));
+    let ball = shape(json!({"sphere": {"radius": 0.7, "subdivisions": 2}}));
+    let (tetrahedra, points) = check("ball", &ball);
+    assert_eq!(points, 2 * ball.vertices.len());
+    assert!(tetrahedra < 3 * ball.simplices.len() + 2 * ball.simplices.len());
+    check("cube in pieces", &cube(-0.3, 0.7, 4));
+    check("cube with thirds", &cube(1.0 / 3.0, 2.0 / 3.0, 3));
+    for (name, object) in [
+        (
+            "notches",
+            json!({"cut_cube": {"min": [0, 0, 0], "max": [1, 1, 1], "cuts": [
+                {"from": [0.5, 0.3, -1], "to": [2, 0.6, 0.5]}, {"from": [-1, 0.2, 0.7], "to": [0.4, 0.8, 2]}]}}),
+        ),
+        ("torus", json!({"isosurface": {"field": {"torus": {"major": 1, "minor": 0.4}}, "grid": {"cells": 9}}})),
+        (
+            "labyrinth",
+            json!({"isosurface": {"field": {"gyroid": {"period": 1.7}},
+                "grid": {"min": [-1, -1, -1], "max": [1, 1, 1], "cells": 6}}}),
+        ),
+    ] {
+        check(name, &shape(object.clone()));
+        // Turned, all planes are askew and all coordinates long.
+        let mut askew = object;
+        askew["transform"] =
+            json!([{"rotate": {"plane": "xy", "degrees": 17}}, {"rotate": {"plane": "yz", "degrees": 31}}]);
+        check(name, &shape(askew));
+    }
+    check("hollow", &together(cube(0.0, 1.0, 1), &turned(cube(0.25, 0.75, 2))));
+    check("two", &together(cube(0.0, 1.0, 1), &cube(2.0, 3.0, 1)));
+    check("two that share a corner", &together(cube(0.0, 1.0, 2), &cube(1.0, 2.0, 1)));
+}
+
+#[test]
+fn large_solids_are_filled() {
+    // Hundreds of triangles, askew, with many planes that nearly coincide.
+    let object = json!({
+        "isosurface": {"field": {"gyroid": {"period": 1.3, "wall": 0.5}},
+            "grid": {"min": [-1, -1, -1], "max": [1, 1, 1], "cells": 5}},
+        "transform": [{"rotate": {"plane": "xy", "degrees": 17}}, {"rotate": {"plane": "yz", "degrees": 31}}],
+    });
+    let surface = shape(object);
+    assert!(surface.simplices.len() > 500);
+    let started = std::time::Instant::now();
+    let (tetrahedra, points) = check("labyrinth", &surface);
+    let (count, seconds) = (surface.simplices.len(), started.elapsed().as_secs_f64());
+    println!("{count} triangles: {tetrahedra} tetrahedra, {points} points, {seconds:.2} s");
+}
+
+#[test]
+fn surfaces_without_an_inside_are_refused() {
+    let mut open = cube(0.0, 1.0, 1);
+    open.simplices.pop();
+    let mut flipped = cube(0.0, 1.0, 1);
+    flipped.simplices[3].swap(0, 1);
+    let mut moved = cube(0.5, 1.5, 1);
+    moved.vertices.iter_mut().for_each(|v| *v += Vector64::from([0.1, 0.2, 0.3]));
+    let mut flat = cube(0.0, 1.0, 1);
+    flat.vertices.iter_mut().for_each(|v| v[2] = 0.0);
+    for (surface, message) in [
+        (open, "is open at 3 edges: caps need a closed surface; repair it, or write caps: false for walls only"),
+        (flipped, "has neighbouring triangles that face opposite ways at 3 edges"),
+        // Legs that reach into the body.
+        (shape(json!({"file": "ant.ply"})), "repair it, or write caps: false for walls only"),
+        (together(cube(0.0, 1.0, 1), &moved), "passes through itself"),
+        (together(cube(0.0, 1.0, 1), &cube(0.25, 0.75, 1)), "passes through itself"),
+        (together(cube(0.0, 1.0, 1), &turned(cube(2.0, 3.0, 1))), "passes through itself"),
+        (flat, "has triangles that lie on each other"),
+    ] {
+        let found = capped(&surface).unwrap_err();
+        assert!(found.starts_with("extrude.mesh: ") && found.contains(message), "{found}");
+    }
+}
