@@ -15,6 +15,8 @@ use crate::geometry::{Aabb, Vector};
 const BINS: usize = 16;
 /// Leaves hold at most this many boxes.
 const LEAF: usize = 4;
+/// What it costs to go through a node, in tests of what a leaf holds.
+const NODE_COST: f32 = 1.0;
 /// Below this depth splits halve the count.
 const SAH_DEPTH: usize = 48;
 /// No tree is deeper: halving what a `u32` can count takes 32 levels.
@@ -170,7 +172,7 @@ fn divide<const D: usize>(
         binning.bins(items)
     };
     match binning.best_split(&bins, items.len()).filter(|_| depth < SAH_DEPTH) {
-        Some(split) if items.len() > LEAF || split.cost < bounds.half_surface() * items.len() as f32 => {
+        Some(split) if items.len() > LEAF || split.cost < bounds.half_surface() * (items.len() as f32 - NODE_COST) => {
             let middle = partition(items, |item| binning.bin(item, split.axis) <= split.bin);
             Some((middle, split.sides))
         }
