@@ -44,36 +44,41 @@ uint NAME(meets)(float4 position, float4 way, __global const float4 *corners, RE
     REAL4 p = CONVERT(position), w = CONVERT(way);
     REAL4 v0 = CONVERT(corners[0]), v1 = CONVERT(corners[1]), v2 = CONVERT(corners[2]);
     REAL4 e0 = v0 - p, e1 = v1 - p, d1 = v1 - v0, d2 = v2 - v0, g2 = v2 - v1;
-    REAL value[D], bound[D];
-    REAL s_e0 = NAME(size)(e0), s_e1 = NAME(size)(e1), s_d1 = NAME(size)(d1), s_d2 = NAME(size)(d2);
     REAL s_w = NAME(size)(w) * rounding;
+    REAL s_e0 = NAME(size)(e0), s_e1 = NAME(size)(e1), s_d1 = NAME(size)(d1), s_d2 = NAME(size)(d2);
+    /* A direction with weights of both signs is outside of the cone and of its opposite; mostly two weights tell. All
+       comparisons are such that what is not a number is in doubt. */
 #if D == 4
     REAL4 v3 = CONVERT(corners[3]);
-    REAL4 d3 = v3 - v0, g3 = v3 - v1;
+    REAL4 d3 = v3 - v0;
     REAL s_d3 = NAME(size)(d3);
-    value[0] = NAME(dot_)(NAME(cross_)(e1, g2, g3), w);
-    value[1] = -NAME(dot_)(NAME(cross_)(e0, d2, d3), w);
-    value[2] = NAME(dot_)(NAME(cross_)(e0, d1, d3), w);
-    value[3] = -NAME(dot_)(NAME(cross_)(e0, d1, d2), w);
-    bound[0] = s_w * s_e1 * NAME(size)(g2) * NAME(size)(g3) + tiny;
-    bound[1] = s_w * s_e0 * s_d2 * s_d3 + tiny;
-    bound[2] = s_w * s_e0 * s_d1 * s_d3 + tiny;
-    bound[3] = s_w * s_e0 * s_d1 * s_d2 + tiny;
+    REAL a = -NAME(dot_)(NAME(cross_)(e0, d2, d3), w), a_bound = s_w * s_e0 * s_d2 * s_d3 + tiny;
+    REAL b = NAME(dot_)(NAME(cross_)(e0, d1, d3), w), b_bound = s_w * s_e0 * s_d1 * s_d3 + tiny;
 #else
-    value[0] = NAME(dot_)(NAME(cross_)(e1, g2), w);
-    value[1] = -NAME(dot_)(NAME(cross_)(e0, d2), w);
-    value[2] = NAME(dot_)(NAME(cross_)(e0, d1), w);
-    bound[0] = s_w * s_e1 * NAME(size)(g2) + tiny;
-    bound[1] = s_w * s_e0 * s_d2 + tiny;
-    bound[2] = s_w * s_e0 * s_d1 + tiny;
+    REAL a = -NAME(dot_)(NAME(cross_)(e0, d2), w), a_bound = s_w * s_e0 * s_d2 + tiny;
+    REAL b = NAME(dot_)(NAME(cross_)(e0, d1), w), b_bound = s_w * s_e0 * s_d1 + tiny;
 #endif
-    /* Written so that what is not a number is in doubt. */
-    uint above = 0, below = 0;
-    for (int i = 0; i < D; i++) {
-        above += value[i] > bound[i];
-        below += -value[i] > bound[i];
-    }
-    /* A direction with weights of both signs is outside of the cone and of its opposite. */
+    uint above = (a > a_bound) + (b > b_bound), below = (-a > a_bound) + (-b > b_bound);
+    if (above > 0 && below > 0) return OPEN;
+    REAL sum = fabs(a) + fabs(b), sum_bound = a_bound + b_bound;
+#if D == 4
+    a = -NAME(dot_)(NAME(cross_)(e0, d1, d2), w);
+    a_bound = s_w * s_e0 * s_d1 * s_d2 + tiny;
+    REAL4 g3 = v3 - v1;
+    b = NAME(dot_)(NAME(cross_)(e1, g2, g3), w);
+    b_bound = s_w * s_e1 * NAME(size)(g2) * NAME(size)(g3) + tiny;
+    above += a > a_bound;
+    below += -a > a_bound;
+    sum += fabs(a);
+    sum_bound += a_bound;
+#else
+    b = NAME(dot_)(NAME(cross_)(e1, g2), w);
+    b_bound = s_w * s_e1 * NAME(size)(g2) + tiny;
+#endif
+    above += b > b_bound;
+    below += -b > b_bound;
+    sum += fabs(b);
+    sum_bound += b_bound;
     if (above > 0 && below > 0) return OPEN;
     if (above + below == 0) return UNSURE;
 #if D == 4
@@ -86,11 +91,6 @@ uint NAME(meets)(float4 position, float4 way, __global const float4 *corners, RE
     REAL oriented = above > 0 ? determinant : -determinant;
     if (-oriented > determinant_bound) return OPEN;
     if (!(oriented > determinant_bound) || above + below < D) return UNSURE;
-    REAL sum = 0, sum_bound = 0;
-    for (int i = 0; i < D; i++) {
-        sum += fabs(value[i]);
-        sum_bound += bound[i];
-    }
     *t = oriented / sum;
     *t_error = 4 * *t * (sum_bound / sum + determinant_bound / oriented + 4 * HALF_ULP);
     return HIT;

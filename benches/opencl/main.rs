@@ -1,7 +1,7 @@
 //! Any-hit rays per second of an OpenCL device beside the processor, and the share that the device leaves to the host:
 //!
 //! ```text
-//! cargo bench --bench opencl [-- PLATFORM.DEVICE]
+//! cargo bench --bench opencl [-- PLATFORM.DEVICE ...]
 //! ```
 //!
 //! 256 scrambled Sobol rays a vertex, some thousand vertices of each mesh; the values are held against each other.
@@ -65,18 +65,17 @@ fn measure<const D: usize>(opencl: &OpenCl, name: &str, mesh: &Mesh<D>) {
 }
 
 fn main() {
-    let place = std::env::args().skip(1).find_map(|a| {
-        let (p, d) = a.split_once('.')?;
-        Some((p.parse().ok()?, d.parse().ok()?))
-    });
-    let opencl = match OpenCl::open(place) {
+    let place = |a: String| a.split_once('.').and_then(|(p, d)| Some((p.parse().ok()?, d.parse().ok()?)));
+    let places: Vec<(usize, usize)> = std::env::args().skip(1).filter_map(place).collect();
+    let opencl = match OpenCl::open(&places) {
         Ok(opencl) => opencl,
         Err(error) => {
             println!("{error}");
             return;
         }
     };
-    println!("{}, rays in millions a second\n", opencl.info().label());
+    let labels: Vec<String> = opencl.devices().map(|info| info.label()).collect();
+    println!("{}, rays in millions a second\n", labels.join(" and "));
     println!("| mesh | simplices | scalar | streams | device | / scalar | / streams | left to the host | values |");
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- |");
     for size in ["10k", "100k"] {

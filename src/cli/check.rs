@@ -21,8 +21,8 @@ pub struct Check {
 impl Check {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         let (pipelines, settings) = self.options.load_all(console)?;
-        if let Backend::OpenCl(place) = settings.backend {
-            OpenCl::open(place).map_err(|error| Failure::Failed(Box::new(error)))?;
+        if let Backend::OpenCl(places) = &settings.backend {
+            OpenCl::open(places).map_err(|error| Failure::Failed(Box::new(error)))?;
         }
         for pipeline in &pipelines {
             let prepared = pipeline.prepare(|_| true)?;

@@ -32,7 +32,7 @@ pub struct PipelineOptions {
     /// Write into this folder instead of out/NAME
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// What computes occlusion: cpu, opencl, or opencl:PLATFORM.DEVICE
+    /// What traces rays: cpu, opencl, or opencl:PLATFORM.DEVICE, several joined by +
     #[arg(long, value_name = "BACKEND", default_value = "cpu")]
     pub backend: Backend,
     /// How many threads to use [default: all]
@@ -46,7 +46,7 @@ pub struct PipelineOptions {
 impl PipelineOptions {
     /// Reads and checks the pipelines, and prints their warnings. One that is refused refuses them all.
     pub fn load_all(&self, console: &Console) -> Result<(Vec<Pipeline>, Settings), Failure> {
-        let settings = Settings { backend: self.backend, threads: self.threads, force: self.force };
+        let settings = Settings { backend: self.backend.clone(), threads: self.threads, force: self.force };
         if self.pipelines.len() > 1 && self.out.is_some() {
             return Err(Failure::refused(
                 "--out names one folder, and there are several pipelines; run them one by one",

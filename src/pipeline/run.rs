@@ -89,9 +89,9 @@ pub fn run(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) ->
 fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
     let began = Instant::now();
     let plan = &pipeline.plan;
-    let opencl = match settings.backend {
+    let opencl = match &settings.backend {
         Backend::Cpu => None,
-        Backend::OpenCl(place) => Some(OpenCl::open(place)?),
+        Backend::OpenCl(places) => Some(OpenCl::open(places)?),
     };
     let keys = Keys::new(plan);
     let cache = Cache::open(&plan.out, settings.force);

@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use std::str::FromStr;
 
 /// The settings of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Settings {
     /// What computes occlusion.
     pub backend: Backend,
@@ -16,13 +16,13 @@ pub struct Settings {
 }
 
 /// What computes occlusion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Backend {
     /// The processor.
     #[default]
     Cpu,
-    /// An OpenCL device: of that platform and number, or the first that fits.
-    OpenCl(Option<(usize, usize)>),
+    /// OpenCL devices of these platforms and numbers, which share the work; if none is named, the one that fits best.
+    OpenCl(Vec<(usize, usize)>),
 }
 
 /// A backend that can't be.
@@ -36,13 +36,13 @@ impl FromStr for Backend {
     fn from_str(text: &str) -> Result<Self, BackendError> {
         let numbers = match text.split_once(':') {
             None if text == "cpu" => return Ok(Backend::Cpu),
-            None if text == "opencl" => return Ok(Backend::OpenCl(None)),
+            None if text == "opencl" => return Ok(Backend::OpenCl(Vec::new())),
             Some(("opencl", numbers)) => numbers,
             _ => return Err(BackendError),
         };
         let number = |digits: &str| digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok()).flatten();
-        let pair = numbers.split_once('.').and_then(|(p, d)| number(p).zip(number(d)));
-        pair.map(|pair| Backend::OpenCl(Some(pair))).ok_or(BackendError)
+        let pair = |text: &str| text.split_once('.').and_then(|(p, d)| number(p).zip(number(d)));
+        numbers.split('+').map(pair).collect::<Option<Vec<_>>>().map(Backend::OpenCl).ok_or(BackendError)
     }
 }
 
@@ -50,8 +50,11 @@ impl fmt::Display for Backend {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Backend::Cpu => f.write_str("cpu"),
-            Backend::OpenCl(None) => f.write_str("opencl"),
-            Backend::OpenCl(Some((platform, device))) => write!(f, "opencl:{platform}.{device}"),
+            Backend::OpenCl(places) if places.is_empty() => f.write_str("opencl"),
+            Backend::OpenCl(places) => {
+                let places: Vec<String> = places.iter().map(|(p, d)| format!("{p}.{d}")).collect();
+                write!(f, "opencl:{}", places.join("+"))
+            }
         }
     }
 }
@@ -62,10 +65,22 @@ mod tests {
 
     #[test]
     fn backends_round_trip() {
-        for text in ["cpu", "opencl", "opencl:0.1", "opencl:12.0"] {
+        for text in ["cpu", "opencl", "opencl:0.1", "opencl:12.0", "opencl:0.0+1.0+1.1"] {
             assert_eq!(text.parse::<Backend>().unwrap().to_string(), text);
         }
-        for text in ["", "CPU", "gpu", "opencl:", "opencl:0", "opencl:0.", "opencl:+1.0", "opencl:0.1.2", "cpu:0.0"] {
+        for text in [
+            "",
+            "CPU",
+            "gpu",
+            "opencl:",
+            "opencl:0",
+            "opencl:0.",
+            "opencl:+1.0",
+            "opencl:0.1.2",
+            "cpu:0.0",
+            "opencl:0.0+",
+            "opencl:0.0,1.0",
+        ] {
             assert!(text.parse::<Backend>().is_err(), "{text}");
         }
     }

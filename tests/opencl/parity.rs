@@ -22,7 +22,7 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 fn same_files(path: &Path, overrides: &[&str]) {
     let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
     let mut found = Vec::new();
-    for backend in [Backend::Cpu, Backend::OpenCl(None)] {
+    for backend in [Backend::Cpu, Backend::OpenCl(Vec::new())] {
         let folder = tempfile::tempdir().unwrap();
         let pipeline = Pipeline::load(path, &overrides, Some(folder.path().to_owned())).unwrap();
         let settings = ao4d::pipeline::Settings { backend, ..Default::default() };
@@ -186,7 +186,7 @@ fn soups<const D: usize>(opencl: &OpenCl) {
 #[test]
 #[ignore = "needs an OpenCL device: run tests/all"]
 fn random_soups_at_all_scales() {
-    let opencl = OpenCl::open(None).unwrap();
+    let opencl = OpenCl::open(&[]).unwrap();
     soups::<3>(&opencl);
     soups::<4>(&opencl);
 }
@@ -194,7 +194,7 @@ fn random_soups_at_all_scales() {
 #[test]
 #[ignore = "needs an OpenCL device: run tests/all"]
 fn directions_are_made_there_and_few_rays_are_left_here() {
-    let opencl = OpenCl::open(None).unwrap();
+    let opencl = OpenCl::open(&[]).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let mesh = soup::<4>(&mut random, 2000, 0.1, 0.0, 1.0, 0.0);
     let tracer = Tracer::new(&mesh);
@@ -210,6 +210,14 @@ fn directions_are_made_there_and_few_rays_are_left_here() {
     let mut backwards = scene.estimate(&back, &settings, None, &Silent).unwrap();
     backwards.reverse();
     assert_eq!(first, backwards);
+    // And by two devices together, or one opened twice.
+    let two = OpenCl::open(&[(0, 0), (0, 0)]).unwrap();
+    let scene = Scene::new(&two, &tracer).unwrap();
+    assert_eq!(first, scene.estimate(&points, &settings, None, &Silent).unwrap());
+    let ray = |k: usize| Ray::new(mesh.vertices[k], mesh.vertices[(k * 7 + 1) % 8000] - mesh.vertices[k]);
+    let rays: Vec<Ray<4>> = (0..4000).map(ray).collect();
+    let found = scene.first_hits(&rays, &Silent).unwrap();
+    assert!(rays.iter().zip(found).all(|(r, f)| f == tracer.closest_hit(r).map_or(u32::MAX, |hit| hit.simplex)));
 }
 
 #[test]
@@ -219,7 +227,7 @@ fn many_runs_leave_nothing_behind() {
         let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
         text.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap_or(0) * 4096
     };
-    let opencl = OpenCl::open(None).unwrap();
+    let opencl = OpenCl::open(&[]).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(10);
     let mesh = soup::<3>(&mut random, 500, 0.2, 0.0, 1.0, 0.0);
     let tracer = Tracer::new(&mesh);
@@ -249,7 +257,7 @@ impl ao4d::progress::Progress for Stop {
 #[test]
 #[ignore = "needs an OpenCL device: run tests/all"]
 fn it_can_be_stopped() {
-    let opencl = OpenCl::open(None).unwrap();
+    let opencl = OpenCl::open(&[]).unwrap();
     let mesh = soup::<4>(&mut ChaCha8Rng::seed_from_u64(1), 100, 0.2, 0.0, 1.0, 0.0);
     let tracer = Tracer::new(&mesh);
     let scene = Scene::new(&opencl, &tracer).unwrap();

@@ -82,12 +82,15 @@ impl Device {
 
     /// Compiles the kernels, and sees that structs are what they should be.
     pub fn build(&self, d: usize, depth: usize) -> Result<Kernels, Error> {
-        let text = program::text(d, depth, self.info.double);
+        self.compile(&program::text(d, depth, self.info.double))
+    }
+
+    fn compile(&self, text: &str) -> Result<Kernels, Error> {
         let options =
             if self.info.rounded { "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt" } else { "-cl-std=CL1.2" };
         let id = self.info.id as cl_device_id;
         let mut program =
-            Program::create_from_source(&self.context, &text).map_err(self.failed("handing over the kernels"))?;
+            Program::create_from_source(&self.context, text).map_err(self.failed("handing over the kernels"))?;
         let built = program.build(&[id], options);
         let log = program.get_build_log(id).unwrap_or_default();
         let refuse = |reason: String| Error::Build { device: self.info.label(), reason, log: log.trim().to_owned() };
@@ -196,3 +199,41 @@ impl Device {
 const _: () = {
     assert!(size_of::<layout::Node>() == 48 && size_of::<layout::Site>() == 80 && size_of::<layout::Fold>() == 80);
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::occlusion::opencl::devices::choose;
+
+    /// A device whose answers can be made up.
+    fn open() -> Device {
+        Device::open(choose(None).unwrap()).unwrap()
+    }
+
+    #[test]
+    #[ignore = "needs an OpenCL device: run tests/all"]
+    fn what_the_compiler_says_is_told() {
+        let device = open();
+        let text = program::text(4, 20, device.info.double);
+        let broken = device.compile(&text.replace("float4 position;", "flaot4 position;")).unwrap_err().to_string();
+        assert!(broken.contains("don't compile") && broken.contains("flaot4"), "{broken}");
+        let missing = device.compile(&text.replace("first_hit(", "last_hit(")).unwrap_err().to_string();
+        assert!(missing.contains("no kernel `first_hit`"), "{missing}");
+        let other = device.compile(&text.replace("uint padding[2];", "uint padding[6];")).unwrap_err();
+        assert!(matches!(other, Error::Layout { .. }), "{other}");
+        assert!(device.compile(&text).is_ok());
+    }
+
+    #[test]
+    #[ignore = "needs an OpenCL device: run tests/all"]
+    fn what_does_not_fit_is_told() {
+        let mut device = open();
+        let room = device.info.largest as usize / 4 + 1;
+        let error = device.empty::<f32>(room, "the corners of the simplices").unwrap_err();
+        assert!(matches!(error, Error::TooLarge { .. }) && error.to_string().contains("the corners"), "{error}");
+        // A device that says it takes anything, and doesn't.
+        device.info.largest = 0;
+        let error = device.empty::<f32>(1 << 50, "results").unwrap_err().to_string();
+        assert!(error.starts_with(&device.info.label()) && error.contains("asking for memory failed"), "{error}");
+    }
+}

@@ -1,5 +1,7 @@
 //! The OpenCL devices of this computer.
 
+use std::sync::{Mutex, PoisonError};
+
 use opencl3::device::{CL_DEVICE_TYPE_ALL, CL_DEVICE_TYPE_CPU, CL_DEVICE_TYPE_GPU, Device};
 use opencl3::platform::{Platform, get_platforms};
 use opencl3::types::cl_device_id;
@@ -90,6 +92,9 @@ impl Info {
 /// # Errors
 /// [`Error::Missing`] if there is no loader, or nothing behind it.
 pub fn devices() -> Result<Vec<Info>, Error> {
+    // Some drivers say that they have no device while another thread has them look.
+    static LOOKING: Mutex<()> = Mutex::new(());
+    let _alone = LOOKING.lock().unwrap_or_else(PoisonError::into_inner);
     let platforms = get_platforms().map_err(|error| Error::Missing(explain(&error)))?;
     let mut found = Vec::new();
     for (p, platform) in platforms.iter().enumerate() {

@@ -29,23 +29,28 @@ pub use scene::Scene;
 
 use device::Device;
 
-/// An open device.
+/// Open devices, that share the work.
 #[derive(Debug)]
 pub struct OpenCl {
-    device: Device,
+    devices: Vec<Device>,
 }
 
 impl OpenCl {
-    /// Opens the device of this platform and number, or the one that [`preferred`] names.
+    /// Opens the devices of these platforms and numbers, or if none is named the one that [`preferred`] names.
     ///
     /// # Errors
-    /// [`Error::Missing`] if there is no OpenCL, [`Error::NoDevice`] if not this device.
-    pub fn open(place: Option<(usize, usize)>) -> Result<Self, Error> {
-        Ok(Self { device: Device::open(devices::choose(place)?)? })
+    /// [`Error::Missing`] if there is no OpenCL, [`Error::NoDevice`] if not such a device.
+    pub fn open(places: &[(usize, usize)]) -> Result<Self, Error> {
+        let open = |place| Device::open(devices::choose(place)?);
+        let devices = match places {
+            [] => vec![open(None)?],
+            places => places.iter().map(|&place| open(Some(place))).collect::<Result<_, _>>()?,
+        };
+        Ok(Self { devices })
     }
 
-    /// What it is.
-    pub fn info(&self) -> &Info {
-        &self.device.info
+    /// What they are.
+    pub fn devices(&self) -> impl Iterator<Item = &Info> {
+        self.devices.iter().map(|device| &device.info)
     }
 }

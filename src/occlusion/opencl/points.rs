@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::device::{Argument, Memory};
 use super::layout::{self, Float4, Fold};
-use super::scene::{MOST_RAYS, Scene, float4, is_exact};
+use super::scene::{MOST_RAYS, Part, Scene, float4, is_exact};
 use crate::geometry::{Cone, Frame, Vector};
 use crate::mesh::Incidence;
 use crate::occlusion::estimate::Tally;
@@ -70,11 +70,10 @@ impl<const D: usize> Scene<'_, D> {
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>, Error> {
         let incidence = Incidence::new(self.tracer.mesh());
-        let mut estimates = Vec::with_capacity(points.len());
-        for points in points.chunks(POINTS) {
-            estimates.extend(self.estimate_some(&incidence, points, settings, target, progress)?);
-        }
-        Ok(estimates)
+        let size = POINTS.min(points.len().div_ceil(if self.parts.len() == 1 { 1 } else { 4 * self.parts.len() }));
+        let jobs: Vec<&[Point<D>]> = points.chunks(size.max(1)).collect();
+        let job = |part: &Part, i: usize| self.estimate_some(part, &incidence, jobs[i], settings, target, progress);
+        Ok(self.share(jobs.len(), job)?.concat())
     }
 
     fn normal(&self, point: &Point<D>) -> Vector<D> {
@@ -114,6 +113,7 @@ impl<const D: usize> Scene<'_, D> {
     /// All points of a chunk: those that need more rays go on together, all of them with as many rays as each other.
     fn estimate_some(
         &self,
+        on: &Part,
         incidence: &Incidence,
         points: &[Point<D>],
         settings: &Settings,
@@ -134,7 +134,18 @@ impl<const D: usize> Scene<'_, D> {
                 None => settings.samples,
             };
             let rays = step.min(settings.samples - done);
-            self.trace(incidence, points, &prepared, &active, rays, &mut sequences, &mut tallies, settings, progress)?;
+            self.trace(
+                on,
+                incidence,
+                points,
+                &prepared,
+                &active,
+                rays,
+                &mut sequences,
+                &mut tallies,
+                settings,
+                progress,
+            )?;
             done += rays;
             let before = active.len();
             active.retain(|&i| done < settings.samples && target.is_none_or(|target| !target.is_met(&tallies[i])));
@@ -148,6 +159,7 @@ impl<const D: usize> Scene<'_, D> {
     #[allow(clippy::too_many_arguments)]
     fn trace(
         &self,
+        on: &Part,
         incidence: &Incidence,
         points: &[Point<D>],
         prepared: &[Prepared<D>],
@@ -158,9 +170,9 @@ impl<const D: usize> Scene<'_, D> {
         settings: &Settings,
         progress: &dyn Progress,
     ) -> Result<(), Error> {
-        let given = settings.sampler == Sampler::Random || !self.makes_directions;
+        let given = settings.sampler == Sampler::Random || !on.makes_directions;
         let limit = (f64::from(settings.max_distance) * self.scale.factor) as f32;
-        let mut on_device = self.on_device.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut on_device = on.on_device.lock().unwrap_or_else(PoisonError::into_inner);
         let mut out: Option<Memory<u8>> = None;
         let mut traced = 0;
         while traced < rays {
@@ -201,12 +213,12 @@ impl<const D: usize> Scene<'_, D> {
                     part.iter().for_each(|&i| sequences[i].next = sequences[i].next.wrapping_add(piece));
                     Vec::new()
                 };
-                let sites = self.device.filled(&sites, "points")?;
-                let folds = self.device.filled(&folds, "cones around points")?;
+                let sites = on.device.filled(&sites, "points")?;
+                let folds = on.device.filled(&folds, "cones around points")?;
                 let uploaded: Vec<Float4> = ways.iter().map(float4).collect();
-                let uploaded = self.device.filled(&uploaded, "rays")?;
+                let uploaded = on.device.filled(&uploaded, "rays")?;
                 if out.as_ref().is_none_or(|out| out.room < total) {
-                    out = Some(self.device.empty::<u8>(total.max(on_device.rays), "results")?);
+                    out = Some(on.device.empty::<u8>(total.max(on_device.rays), "results")?);
                 }
                 let Some(out) = &out else { continue };
                 let arguments = [
@@ -224,9 +236,9 @@ impl<const D: usize> Scene<'_, D> {
                     Argument::F32(limit),
                     out.argument(),
                 ];
-                self.device.launch(&on_device.kernels.occluded, &arguments, total)?;
+                on.device.launch(&on_device.kernels.occluded, &arguments, total)?;
                 let mut found = vec![layout::OPEN; total];
-                self.device.read(out, &mut found)?;
+                on.device.read(out, &mut found)?;
                 on_device.learn(total, start.elapsed().as_secs_f64());
                 found.par_chunks_mut(piece as usize).enumerate().for_each(|(k, found)| {
                     let i = part[k];

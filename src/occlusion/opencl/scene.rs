@@ -1,13 +1,13 @@
 //! A mesh on a device.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use super::device::{Argument, Device, Kernels, Memory};
 use super::layout::{self, Float4};
-use super::{Error, OpenCl};
+use super::{Error, Kind, OpenCl};
 use crate::accel::{Scale, Tracer};
 use crate::geometry::{Ray, Vector};
 use crate::occlusion::sampling::sobol_matrices;
@@ -23,19 +23,25 @@ pub(super) const MOST_RAYS: usize = 1 << 21;
 /// Seconds that a launch may take: long enough to be worth it, short enough for watchdogs.
 const LAUNCH: f64 = 0.06;
 
-/// A mesh with its hierarchy on a device.
+/// A mesh with its hierarchy on one device or several.
 #[derive(Debug)]
 pub struct Scene<'s, const D: usize> {
-    pub(super) device: &'s Device,
+    pub(super) parts: Vec<Part<'s>>,
     pub(super) tracer: &'s Tracer<'s, D>,
     pub(super) scale: Scale<D>,
     /// Whether scaled coordinates lose nothing. If they do, the device isn't asked.
     pub(super) serves: bool,
-    /// Whether the device makes directions like the host.
-    pub(super) makes_directions: bool,
-    /// Rays that the device left to the host.
+    /// Rays that the devices left to the host.
     pub(super) settled: AtomicU64,
-    pub(super) on_device: Mutex<OnDevice>,
+}
+
+/// A device with the mesh on it.
+#[derive(Debug)]
+pub(super) struct Part<'s> {
+    pub device: &'s Device,
+    /// Whether the device makes directions like the host.
+    pub makes_directions: bool,
+    pub on_device: Mutex<OnDevice>,
 }
 
 /// What is on the device, used by one thread at a time.
@@ -67,12 +73,11 @@ pub(super) fn float4<const D: usize>(v: &Vector<D>) -> Float4 {
 }
 
 impl<'s, const D: usize> Scene<'s, D> {
-    /// Brings the mesh and its hierarchy to the device, and compiles the kernels for them.
+    /// Brings the mesh and its hierarchy to the devices, and compiles the kernels for them.
     ///
     /// # Errors
     /// [`Error`] if the device has not enough memory or the kernels don't compile.
     pub fn new(opencl: &'s OpenCl, tracer: &'s Tracer<'s, D>) -> Result<Self, Error> {
-        let device = &opencl.device;
         tracer.prepare();
         let (mesh, bvh) = (tracer.mesh(), tracer.bvh());
         let scale = Scale::of(&mesh.vertices);
@@ -87,26 +92,22 @@ impl<'s, const D: usize> Scene<'s, D> {
             .collect();
         let corners: Vec<Float4> =
             (bvh.order.par_iter()).flat_map_iter(|&s| mesh.corners(s).map(|v| float4(&scale.scaled(&v)))).collect();
-        let kernels = device.build(D, bvh.depth())?;
-        let matrices = device.filled(&sobol_matrices(), "tables")?;
-        let makes_directions = makes_directions::<D>(device, &kernels, &matrices)?;
-        let on_device = OnDevice {
-            kernels,
-            nodes: device.filled(&nodes, "the nodes of the hierarchy")?,
-            corners: device.filled(&corners, "the corners of the simplices")?,
-            simplices: device.filled(&bvh.order, "the simplices")?,
-            matrices,
-            rays: RAYS,
+        let part = |device| {
+            let kernels = Device::build(device, D, bvh.depth())?;
+            let matrices = device.filled(&sobol_matrices(), "tables")?;
+            let makes_directions = makes_directions::<D>(device, &kernels, &matrices)?;
+            let on_device = OnDevice {
+                kernels,
+                nodes: device.filled(&nodes, "the nodes of the hierarchy")?,
+                corners: device.filled(&corners, "the corners of the simplices")?,
+                simplices: device.filled(&bvh.order, "the simplices")?,
+                matrices,
+                rays: RAYS,
+            };
+            Ok(Part { device, makes_directions, on_device: Mutex::new(on_device) })
         };
-        Ok(Self {
-            device,
-            tracer,
-            scale,
-            serves,
-            makes_directions,
-            settled: AtomicU64::new(0),
-            on_device: Mutex::new(on_device),
-        })
+        let parts = opencl.devices.iter().map(part).collect::<Result<_, Error>>()?;
+        Ok(Self { parts, tracer, scale, serves, settled: AtomicU64::new(0) })
     }
 
     /// The mesh and its hierarchy.
@@ -114,17 +115,47 @@ impl<'s, const D: usize> Scene<'s, D> {
         self.tracer
     }
 
-    /// The device.
-    pub fn info(&self) -> &super::Info {
-        &self.device.info
+    /// Whether no device is the processor itself.
+    pub fn is_apart(&self) -> bool {
+        self.parts.iter().all(|part| part.device.info.kind != Kind::Cpu)
     }
 
-    /// Whether the rays of the samplers are made on the device; else they are made here and handed over.
+    /// Whether the rays of the samplers are made on the devices; else they are made here and handed over.
     pub fn makes_directions(&self) -> bool {
-        self.makes_directions
+        self.parts.iter().all(|part| part.makes_directions)
     }
 
-    /// How many rays the device couldn't decide so far, which the host did.
+    /// Does jobs 0 to `count` - 1, each on the device that is free next.
+    pub(super) fn share<R: Send>(
+        &self,
+        count: usize,
+        job: impl Fn(&Part, usize) -> Result<R, OcclusionError> + Sync,
+    ) -> Result<Vec<R>, OcclusionError> {
+        if let [part] = &self.parts[..] {
+            return (0..count).map(|i| job(part, i)).collect();
+        }
+        let next = AtomicUsize::new(0);
+        let of_part = |part| {
+            let taken = || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&i| i < count);
+            std::iter::from_fn(taken).map(|i| Ok((i, job(part, i)?))).collect::<Result<Vec<_>, OcclusionError>>()
+        };
+        let found: Vec<Result<Vec<(usize, R)>, OcclusionError>> = std::thread::scope(|scope| {
+            let threads: Vec<_> = self.parts.iter().map(|part| scope.spawn(|| of_part(part))).collect();
+            let join = |thread: std::thread::ScopedJoinHandle<'_, _>| match thread.join() {
+                Ok(found) => found,
+                Err(panic) => std::panic::resume_unwind(panic),
+            };
+            threads.into_iter().map(join).collect()
+        });
+        let mut all: Vec<(usize, R)> = Vec::with_capacity(count);
+        for part in found {
+            all.extend(part?);
+        }
+        all.sort_by_key(|(i, _)| *i);
+        Ok(all.into_iter().map(|(_, found)| found).collect())
+    }
+
+    /// How many rays the devices couldn't decide so far, which the host did.
     pub fn settled(&self) -> u64 {
         self.settled.load(Ordering::Relaxed)
     }
@@ -143,8 +174,21 @@ impl<'s, const D: usize> Scene<'s, D> {
         if !self.serves {
             return Ok(rays.par_iter().map(host).collect());
         }
+        let count = self.parts.len();
+        let size = if count == 1 { rays.len().max(1) } else { rays.len().div_ceil(4 * count).max(1) };
+        let jobs: Vec<&[Ray<D>]> = rays.chunks(size).collect();
+        Ok(self.share(jobs.len(), |part, i| self.first_hits_on(part, jobs[i], &host, progress))?.concat())
+    }
+
+    fn first_hits_on(
+        &self,
+        on: &Part,
+        rays: &[Ray<D>],
+        host: &(impl Fn(&Ray<D>) -> u32 + Sync),
+        progress: &dyn Progress,
+    ) -> Result<Vec<u32>, OcclusionError> {
         let mut found = vec![layout::NONE; rays.len()];
-        let mut on_device = self.on_device.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut on_device = on.on_device.lock().unwrap_or_else(PoisonError::into_inner);
         let mut begin = 0;
         while begin < rays.len() {
             if progress.cancelled() {
@@ -155,9 +199,9 @@ impl<'s, const D: usize> Scene<'s, D> {
             let start = std::time::Instant::now();
             let origins: Vec<Float4> = part.par_iter().map(|r| float4(&self.scale.scaled(&r.origin))).collect();
             let ways: Vec<Float4> = part.par_iter().map(|r| float4(&r.direction)).collect();
-            let origins = self.device.filled(&origins, "rays")?;
-            let ways = self.device.filled(&ways, "rays")?;
-            let out = self.device.empty::<u32>(part.len(), "results")?;
+            let origins = on.device.filled(&origins, "rays")?;
+            let ways = on.device.filled(&ways, "rays")?;
+            let out = on.device.empty::<u32>(part.len(), "results")?;
             let state = &*on_device;
             let arguments = [
                 state.nodes.argument(),
@@ -169,8 +213,8 @@ impl<'s, const D: usize> Scene<'s, D> {
                 Argument::U64(part.len() as u64),
                 out.argument(),
             ];
-            self.device.launch(&state.kernels.first_hit, &arguments, part.len())?;
-            self.device.read(&out, found)?;
+            on.device.launch(&state.kernels.first_hit, &arguments, part.len())?;
+            on.device.read(&out, found)?;
             on_device.learn(part.len(), start.elapsed().as_secs_f64());
             found.par_iter_mut().zip(part).for_each(|(found, ray)| {
                 if *found == layout::UNSURE_SIMPLEX || !is_exact(&self.scale, &ray.origin) {

@@ -64,11 +64,11 @@ impl<'s, const D: usize> Visibility<'s, D> {
         Self { tracer, camera: camera.clone(), grid: *grid, raster, method, device: None }
     }
 
-    /// Has rays cast by this device, if one is given. One that isn't the processor itself casts rays rather than the
+    /// Has rays cast by this device, if one is given. One apart from the processor casts rays rather than the
     /// processor scan-converts, unless that was asked for.
     pub fn on(mut self, device: Option<&'s opencl::Scene<'s, D>>) -> Self {
         self.device = device;
-        if self.method == Method::Auto && device.is_some_and(|d| d.info().kind != opencl::Kind::Cpu) {
+        if self.method == Method::Auto && device.is_some_and(opencl::Scene::is_apart) {
             self.raster = None;
         }
         self
