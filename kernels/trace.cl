@@ -22,25 +22,30 @@ uint met(float4 position, float4 way, __global const float4 *corners, float limi
     return *t - *t_error > limit * (1.0f + 1e-6f) ? OPEN : UNSURE;
 }
 
-/* The distance at which the ray enters a box, or INFINITY where it misses it. Boxes are a little larger than what they
-   hold, and distances are taken a little wider than they are, more than any rounding: no box is missed that holds a
-   hit. What is not a number changes nothing. */
-float2 clipped(float2 range, float low, float high, float inverse) {
-    float nearer = inverse < 0.0f ? high : low, farther = inverse < 0.0f ? low : high;
-    return (float2)(nearer > range.x ? nearer : range.x, farther < range.y ? farther : range.y);
+/* One over a direction. A component that is next to nothing is taken for 1e-20: over the scene, which is about 1 wide, that
+   moves the ray by less than boxes are grown by. So there is nothing here that is not a number. */
+float4 inverted(float4 way) {
+    float4 size = fabs(way);
+    return 1.0f / copysign(max(size, 1e-20f), way);
 }
 
+/* The distance at which the ray enters a box, or INFINITY where it misses it. Boxes are a little larger than what they
+   hold, and distances are taken a little wider than they are, more than any rounding: no box is missed that holds a
+   hit. */
 float enters(__global const Node *node, float4 position, float4 inverse, float limit) {
     float4 a = (node->low - position) * inverse;
     float4 b = (node->high - position) * inverse;
-    float2 range = (float2)(0.0f, limit);
-    range = clipped(range, a.x, b.x, inverse.x);
-    range = clipped(range, a.y, b.y, inverse.y);
-    range = clipped(range, a.z, b.z, inverse.z);
+    float4 nearer = min(a, b), farther = max(a, b);
 #if D == 4
-    range = clipped(range, a.w, b.w, inverse.w);
+    float enter = max(max(nearer.x, nearer.y), max(nearer.z, nearer.w));
+    float leave = min(min(farther.x, farther.y), min(farther.z, farther.w));
+#else
+    float enter = max(max(nearer.x, nearer.y), nearer.z);
+    float leave = min(min(farther.x, farther.y), farther.z);
 #endif
-    return range.x * (1.0f - 2e-6f) <= range.y * (1.0f + 2e-6f) ? range.x : INFINITY;
+    enter = max(enter, 0.0f);
+    leave = leave < limit ? leave : limit;
+    return enter * (1.0f - 2e-6f) <= leave * (1.0f + 2e-6f) ? enter : INFINITY;
 }
 
 /* As geometry::Ray: components that would overflow the reciprocal are zero. */
@@ -87,7 +92,7 @@ __kernel void occluded(
         out[i] = (uchar)found;
         return;
     }
-    float4 inverse = 1.0f / way;
+    float4 inverse = inverted(way);
     uint stack[STACK];
     uint depth = 0, index = 0;
     if (enters(nodes, site.position, inverse, limit) == INFINITY) {
@@ -133,7 +138,7 @@ __kernel void first_hit(
     size_t i = get_global_id(0);
     if (i >= count) return;
     float4 position = origins[i], way = cleaned(ways[i]);
-    float4 inverse = 1.0f / way;
+    float4 inverse = inverted(way);
     uint best = NONE;
     float nearest = INFINITY, error = 0.0f, doubt = INFINITY;
     uint stack[STACK];

@@ -220,28 +220,6 @@ fn directions_are_made_there_and_few_rays_are_left_here() {
     assert!(rays.iter().zip(found).all(|(r, f)| f == tracer.closest_hit(r).map_or(u32::MAX, |hit| hit.simplex)));
 }
 
-#[test]
-#[ignore = "needs an OpenCL device: run tests/all"]
-fn many_runs_leave_nothing_behind() {
-    let resident = || {
-        let text = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
-        text.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap_or(0) * 4096
-    };
-    let opencl = OpenCl::open(&[]).unwrap();
-    let mut random = ChaCha8Rng::seed_from_u64(10);
-    let mesh = soup::<3>(&mut random, 500, 0.2, 0.0, 1.0, 0.0);
-    let tracer = Tracer::new(&mesh);
-    let scene = Scene::new(&opencl, &tracer).unwrap();
-    let settings = Settings { sampler: Sampler::Random, samples: 16, seed: 5, max_distance: f32::INFINITY };
-    let points: Vec<Point<3>> = (0..200).map(Point::Vertex).collect();
-    let run = |times: usize| (0..times).for_each(|_| drop(scene.estimate(&points, &settings, None, &Silent).unwrap()));
-    run(200);
-    let before = resident();
-    run(1000);
-    let grown = resident().saturating_sub(before);
-    assert!(grown < 20 << 20, "{grown} bytes more after a thousand runs");
-}
-
 /// Stops at once.
 struct Stop;
 

@@ -14,8 +14,9 @@ use crate::occlusion::sampling::sobol_matrices;
 use crate::occlusion::{Cancelled, Error as OcclusionError, Sampler, Sequence};
 use crate::progress::Progress;
 
-/// What boxes grow by on each side, in widths of the scene: so little that it only matters around 0.
-const GROWTH: f32 = 1e-30;
+/// What boxes grow by on each side, in widths of the scene, beside the rounding of that: far more than what
+/// `inverted` of the kernels moves a ray by, and so little that it only matters around 0.
+const GROWTH: f32 = 1e-18;
 /// Rays of a launch to begin with.
 const RAYS: usize = 1 << 17;
 /// The most rays of a launch.
