@@ -1,12 +1,14 @@
 //! Shading points on a device.
 
 use std::sync::PoisonError;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::device::{Argument, Memory};
+use super::device::Argument;
 use super::layout::{self, Float4, Fold};
-use super::scene::{MOST_RAYS, Part, Scene, float4, is_exact};
+use super::scene::{MOST_RAYS, OnDevice, Part, Scene, float4, is_exact};
 use crate::geometry::{Cone, Frame, Vector};
 use crate::mesh::Incidence;
 use crate::occlusion::estimate::Tally;
@@ -47,14 +49,31 @@ struct Prepared<const D: usize> {
     folds: Vec<Fold>,
 }
 
+/// Points that are worked on together.
+struct Chunk<'a, const D: usize> {
+    incidence: &'a Incidence,
+    points: &'a [Point<D>],
+    prepared: Vec<Prepared<D>>,
+    settings: &'a Settings,
+    /// Whether directions are made here and handed over.
+    given: bool,
+}
+
+/// How far a point's rays have come.
+struct Running {
+    sequence: Sequence,
+    tally: Tally,
+}
+
 /// A point as the device knows it, so far as its rays are concerned.
-pub(super) fn sampled_site<const D: usize>(frame: &Frame<D>, sequence: &Sequence, next: u32) -> layout::Site {
+pub(super) fn sampled_site<const D: usize>(frame: &Frame<D>, sequence: &Sequence) -> layout::Site {
     let (axis, factor, turned) = frame.parts();
     let keys = match &sequence.source {
         Source::Sobol(keys) => *keys,
         Source::Random(_) => [0; 4],
     };
-    layout::Site { axis: float4(axis), keys, factor, turned: u32::from(turned), next, ..layout::Site::default() }
+    let (turned, next) = (u32::from(turned), sequence.next);
+    layout::Site { axis: float4(axis), keys, factor, turned, next, ..layout::Site::default() }
 }
 
 impl<const D: usize> Scene<'_, D> {
@@ -72,7 +91,12 @@ impl<const D: usize> Scene<'_, D> {
         let incidence = Incidence::new(self.tracer.mesh());
         let size = POINTS.min(points.len().div_ceil(if self.parts.len() == 1 { 1 } else { 4 * self.parts.len() }));
         let jobs: Vec<&[Point<D>]> = points.chunks(size.max(1)).collect();
-        let job = |part: &Part, i: usize| self.estimate_some(part, &incidence, jobs[i], settings, target, progress);
+        let job = |on: &Part, i: usize| {
+            let prepared = jobs[i].par_iter().map(|p| self.prepare(&incidence, p)).collect();
+            let given = settings.sampler == Sampler::Random || !on.makes_directions;
+            let chunk = Chunk { incidence: &incidence, points: jobs[i], prepared, settings, given };
+            self.estimate_chunk(on, &chunk, target, progress)
+        };
         Ok(self.share(jobs.len(), job)?.concat())
     }
 
@@ -102,81 +126,52 @@ impl<const D: usize> Scene<'_, D> {
         }
     }
 
-    /// The point for exact arithmetic.
-    fn site(&self, incidence: &Incidence, point: &Point<D>) -> Site<D> {
-        match *point {
-            Point::Vertex(vertex) => Site::at_vertex(self.tracer, incidence, vertex),
-            Point::Inside { position, normal, simplex, .. } => Site::inside_simplex(position, normal, simplex),
-        }
-    }
-
-    /// All points of a chunk: those that need more rays go on together, all of them with as many rays as each other.
-    fn estimate_some(
+    /// All points of a chunk: those that need more rays go on together, each with as many as the others.
+    fn estimate_chunk(
         &self,
         on: &Part,
-        incidence: &Incidence,
-        points: &[Point<D>],
-        settings: &Settings,
+        chunk: &Chunk<D>,
         target: Option<Target>,
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>, Error> {
-        let prepared: Vec<Prepared<D>> = points.par_iter().map(|p| self.prepare(incidence, p)).collect();
-        let mut sequences: Vec<Sequence> =
-            prepared.par_iter().map(|p| Sequence::new(settings.sampler, settings.seed, p.number)).collect();
-        let mut tallies = vec![Tally::new(settings.sampler); points.len()];
-        let mut active: Vec<usize> = (0..points.len()).filter(|&i| self.normal(&points[i]).amax() > 0.0).collect();
-        progress.advance((points.len() - active.len()) as u64);
-        let known: Vec<bool> = points.par_iter().map(|p| self.normal(p).amax() == 0.0).collect();
+        let settings = chunk.settings;
+        let run = |p: &Prepared<D>| Running {
+            sequence: Sequence::new(settings.sampler, settings.seed, p.number),
+            tally: Tally::new(settings.sampler),
+        };
+        let mut running: Vec<Running> = chunk.prepared.par_iter().map(run).collect();
+        // Without a normal there is nothing to ask.
+        let open: Vec<bool> = chunk.points.iter().map(|p| self.normal(p).amax() == 0.0).collect();
+        let mut active: Vec<usize> = (0..open.len()).filter(|&i| !open[i]).collect();
+        progress.advance((open.len() - active.len()) as u64);
         let mut done = 0;
         while !active.is_empty() {
-            let step = match target {
-                Some(_) => done.max(Target::FEWEST),
-                None => settings.samples,
-            };
-            let rays = step.min(settings.samples - done);
-            self.trace(
-                on,
-                incidence,
-                points,
-                &prepared,
-                &active,
-                rays,
-                &mut sequences,
-                &mut tallies,
-                settings,
-                progress,
-            )?;
-            done += rays;
+            let step = target.map_or(settings.samples, |_| done.max(Target::FEWEST)).min(settings.samples - done);
+            self.trace(on, chunk, &active, step, &mut running, progress)?;
+            done += step;
             let before = active.len();
-            active.retain(|&i| done < settings.samples && target.is_none_or(|target| !target.is_met(&tallies[i])));
+            let goes_on = |tally| done < settings.samples && target.is_none_or(|target| !target.is_met(tally));
+            active.retain(|&i| goes_on(&running[i].tally));
             progress.advance((before - active.len()) as u64);
         }
-        let estimate = |(known, tally): (bool, Tally)| if known { Estimate::known(1.0) } else { tally.estimate() };
-        Ok(known.into_iter().zip(tallies).map(estimate).collect())
+        let estimate = |(open, r): (bool, Running)| if open { Estimate::known(1.0) } else { r.tally.estimate() };
+        Ok(open.into_iter().zip(running).map(estimate).collect())
     }
 
-    /// Traces so many more rays of the active points.
-    #[allow(clippy::too_many_arguments)]
+    /// Traces so many more rays of the active points, a launch at a time.
     fn trace(
         &self,
         on: &Part,
-        incidence: &Incidence,
-        points: &[Point<D>],
-        prepared: &[Prepared<D>],
+        chunk: &Chunk<D>,
         active: &[usize],
         rays: u32,
-        sequences: &mut [Sequence],
-        tallies: &mut [Tally],
-        settings: &Settings,
+        running: &mut [Running],
         progress: &dyn Progress,
     ) -> Result<(), Error> {
-        let given = settings.sampler == Sampler::Random || !on.makes_directions;
-        let limit = (f64::from(settings.max_distance) * self.scale.factor) as f32;
         let mut on_device = on.on_device.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut out: Option<Memory<u8>> = None;
         let mut traced = 0;
         while traced < rays {
-            // Few points with many rays take them piece by piece, in multiples of 64 but for the last.
+            // Many rays of a point go piece by piece, in multiples of 64 but for the last.
             let piece = (rays - traced).min(MOST_RAYS as u32 / 4);
             let mut begin = 0;
             while begin < active.len() {
@@ -185,77 +180,13 @@ impl<const D: usize> Scene<'_, D> {
                 }
                 let count = (on_device.rays / piece as usize).clamp(1, active.len() - begin);
                 let part = &active[begin..begin + count];
-                let start = std::time::Instant::now();
-                let total = count * piece as usize;
-                let mut sites = Vec::with_capacity(count);
-                let mut folds = Vec::new();
-                for &i in part {
-                    let point = &prepared[i];
-                    sites.push(layout::Site {
-                        position: float4(&self.scale.scaled(&point.position)),
-                        ignored: point.ignored,
-                        fold_first: folds.len() as u32,
-                        fold_count: point.folds.len() as u32,
-                        ..sampled_site(&point.frame, &sequences[i], sequences[i].next)
-                    });
-                    folds.extend_from_slice(&point.folds);
-                }
-                let firsts: Vec<u32> = part.iter().map(|&i| sequences[i].next).collect();
-                let ways: Vec<Vector<D>> = if given {
-                    let mut ways = vec![Vector::zeros(); total];
-                    let mut of: Vec<(usize, &mut Sequence)> =
-                        sequences.iter_mut().enumerate().filter(|(i, _)| part.binary_search(i).is_ok()).collect();
-                    ways.par_chunks_mut(piece as usize).zip(of.par_iter_mut()).for_each(|(ways, (i, sequence))| {
-                        ways.iter_mut().for_each(|way| *way = sequence.next_direction(&prepared[*i].frame));
-                    });
-                    ways
-                } else {
-                    part.iter().for_each(|&i| sequences[i].next = sequences[i].next.wrapping_add(piece));
-                    Vec::new()
-                };
-                let sites = on.device.filled(&sites, "points")?;
-                let folds = on.device.filled(&folds, "cones around points")?;
-                let uploaded: Vec<Float4> = ways.iter().map(float4).collect();
-                let uploaded = on.device.filled(&uploaded, "rays")?;
-                if out.as_ref().is_none_or(|out| out.room < total) {
-                    out = Some(on.device.empty::<u8>(total.max(on_device.rays), "results")?);
-                }
-                let Some(out) = &out else { continue };
-                let arguments = [
-                    on_device.nodes.argument(),
-                    on_device.corners.argument(),
-                    on_device.simplices.argument(),
-                    Argument::U32(u32::from(self.is_empty())),
-                    sites.argument(),
-                    folds.argument(),
-                    on_device.matrices.argument(),
-                    uploaded.argument(),
-                    Argument::U32(u32::from(given)),
-                    Argument::U32(piece),
-                    Argument::U64(total as u64),
-                    Argument::F32(limit),
-                    out.argument(),
-                ];
-                on.device.launch(&on_device.kernels.occluded, &arguments, total)?;
-                let mut found = vec![layout::OPEN; total];
-                on.device.read(out, &mut found)?;
-                on_device.learn(total, start.elapsed().as_secs_f64());
-                found.par_chunks_mut(piece as usize).enumerate().for_each(|(k, found)| {
-                    let i = part[k];
-                    let way = |n: usize| match given {
-                        true => ways[k * piece as usize + n],
-                        false => {
-                            let mut sequence = Sequence::new(settings.sampler, settings.seed, prepared[i].number);
-                            sequence.next = firsts[k].wrapping_add(n as u32);
-                            sequence.next_direction(&prepared[i].frame)
-                        }
-                    };
-                    self.settle(incidence, &points[i], prepared[i].serves, settings.max_distance, found, way);
-                });
+                let start = Instant::now();
+                let found = self.launch(on, &on_device, chunk, part, piece, running)?;
+                on_device.learn(found.len(), start.elapsed().as_secs_f64());
                 for (&i, found) in part.iter().zip(found.chunks(piece as usize)) {
                     for word in found.chunks(64) {
                         let open = word.iter().rev().fold(0u64, |bits, &f| bits << 1 | u64::from(f == layout::OPEN));
-                        tallies[i].add(open, word.len() as u32);
+                        running[i].tally.add(open, word.len() as u32);
                     }
                 }
                 begin += count;
@@ -265,26 +196,93 @@ impl<const D: usize> Scene<'_, D> {
         Ok(())
     }
 
-    /// Decides exactly what the device left open.
-    fn settle(
+    /// What becomes of the next `piece` rays of each point of a part: open or hit, point after point.
+    fn launch(
         &self,
-        incidence: &Incidence,
-        point: &Point<D>,
-        serves: bool,
-        limit: f32,
-        found: &mut [u8],
-        way: impl Fn(usize) -> Vector<D>,
-    ) {
+        on: &Part,
+        on_device: &OnDevice,
+        chunk: &Chunk<D>,
+        part: &[usize],
+        piece: u32,
+        running: &mut [Running],
+    ) -> Result<Vec<u8>, Error> {
+        let size = piece as usize;
+        let total = part.len() * size;
+        let mut sites = Vec::with_capacity(part.len());
+        let mut folds = Vec::new();
+        for &i in part {
+            let point = &chunk.prepared[i];
+            sites.push(layout::Site {
+                position: float4(&self.scale.scaled(&point.position)),
+                ignored: point.ignored,
+                fold_first: folds.len() as u32,
+                fold_count: point.folds.len() as u32,
+                ..sampled_site(&point.frame, &running[i].sequence)
+            });
+            folds.extend_from_slice(&point.folds);
+        }
+        let firsts: Vec<u32> = part.iter().map(|&i| running[i].sequence.next).collect();
+        let mut ways = Vec::new();
+        for &i in part {
+            let sequence = &mut running[i].sequence;
+            if chunk.given {
+                ways.extend((0..piece).map(|_| sequence.next_direction::<D>(&chunk.prepared[i].frame)));
+            } else {
+                sequence.next = sequence.next.wrapping_add(piece);
+            }
+        }
+        let given: Vec<Float4> = ways.iter().map(float4).collect();
+        let (sites, folds) = (on.device.filled(&sites, "points")?, on.device.filled(&folds, "cones around points")?);
+        let (given, out) = (on.device.filled(&given, "rays")?, on.device.empty::<u8>(total, "results")?);
+        let arguments = [
+            on_device.nodes.argument(),
+            on_device.corners.argument(),
+            on_device.simplices.argument(),
+            Argument::U32(u32::from(self.is_empty())),
+            sites.argument(),
+            folds.argument(),
+            on_device.matrices.argument(),
+            given.argument(),
+            Argument::U32(u32::from(chunk.given)),
+            Argument::U32(piece),
+            Argument::U64(total as u64),
+            Argument::F32((f64::from(chunk.settings.max_distance) * self.scale.factor) as f32),
+            out.argument(),
+        ];
+        on.device.launch(&on_device.kernels.occluded, &arguments, total)?;
+        let mut found = vec![layout::OPEN; total];
+        on.device.read(&out, &mut found)?;
+        found.par_chunks_mut(size).enumerate().for_each(|(k, found)| {
+            let way = |n: usize| {
+                if chunk.given {
+                    return ways[k * size + n];
+                }
+                let point = &chunk.prepared[part[k]];
+                let mut sequence = Sequence::new(chunk.settings.sampler, chunk.settings.seed, point.number);
+                sequence.next = firsts[k].wrapping_add(n as u32);
+                sequence.next_direction(&point.frame)
+            };
+            self.settle(chunk, part[k], found, way);
+        });
+        Ok(found)
+    }
+
+    /// Decides exactly what the device left open, of the rays of one point.
+    fn settle(&self, chunk: &Chunk<D>, index: usize, found: &mut [u8], way: impl Fn(usize) -> Vector<D>) {
         let (mut site, mut settled) = (None, 0);
         for (n, found) in found.iter_mut().enumerate() {
-            if serves && matches!(*found, layout::OPEN | layout::HIT) {
+            if chunk.prepared[index].serves && matches!(*found, layout::OPEN | layout::HIT) {
                 continue;
             }
-            let site = site.get_or_insert_with(|| self.site(incidence, point));
+            let site = site.get_or_insert_with(|| match chunk.points[index] {
+                Point::Vertex(vertex) => Site::at_vertex(self.tracer, chunk.incidence, vertex),
+                Point::Inside { position, normal, simplex, .. } => Site::inside_simplex(position, normal, simplex),
+            });
             settled += 1;
-            *found = if site.is_visible(self.tracer, way(n), limit) { layout::OPEN } else { layout::HIT };
+            let visible = site.is_visible(self.tracer, way(n), chunk.settings.max_distance);
+            *found = if visible { layout::OPEN } else { layout::HIT };
         }
-        self.settled.fetch_add(settled, std::sync::atomic::Ordering::Relaxed);
+        self.settled.fetch_add(settled, Ordering::Relaxed);
     }
 }
 

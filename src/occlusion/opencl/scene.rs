@@ -245,7 +245,7 @@ fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, matrices
     };
     let sequence = |site| Sequence::new(Sampler::Sobol, 1, site);
     let sites: Vec<layout::Site> =
-        (0..SITES).map(|site| super::points::sampled_site(&frame(site), &sequence(site), 0)).collect();
+        (0..SITES).map(|site| super::points::sampled_site(&frame(site), &sequence(site))).collect();
     let count = (SITES * u64::from(RAYS)) as usize;
     let (sites, out) = (device.filled(&sites, "points")?, device.empty::<Float4>(count, "results")?);
     let arguments = [sites.argument(), matrices.argument(), Argument::U32(RAYS), out.argument()];
