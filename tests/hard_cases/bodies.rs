@@ -91,6 +91,10 @@ pub fn plain<const D: usize>() -> Vec<Body<D>> {
         ),
         Body::around_origin("cross-polytope", sphere(1.0, 1), 0.2, 1.0 / 64.0),
     ];
+    if D == 4 {
+        let cells = json!({"hypersphere": {"radius": 1, "from": "600-cell", "subdivisions": 2}});
+        bodies.push(Body::around_origin("600-cell, subdivided", object(cells), 0.5, 1e-3));
+    }
     // A cube with a groove, and points inside it, also in the planes of the groove's sides.
     let (from, to) = (vec![0.25; 2], vec![2.0; 2]);
     let groove = |ends: Vec<f64>, rest: f64| -> Vec<f64> { (0..D).map(|i| *ends.get(i).unwrap_or(&rest)).collect() };
