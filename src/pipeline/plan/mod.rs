@@ -30,9 +30,6 @@ pub use describe::{Description, SceneCounts, grouped, size};
 use super::Cut;
 use super::error::Invalid;
 use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading, Visibility};
-
-/// The methods of occlusion that this version has.
-pub const METHODS: &[Method] = &[Method::Sobol, Method::Random, Method::Adaptive, Method::Exact, Method::AsPublished];
 /// The most samples a vertex.
 pub const MAX_SAMPLES: u64 = 1 << 24;
 /// The most pieces that a vertex's view may be cut into.

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::range::positive;
 use super::resolve::Resolver;
 use super::{
-    Computation, MAX_CONES, MAX_OBJECTS, MAX_SAMPLES, METHODS, NO_SCENE, OcclusionPlan, OcclusionSource, Samples,
-    ScenePlan, StageRef,
+    Computation, MAX_CONES, MAX_OBJECTS, MAX_SAMPLES, NO_SCENE, OcclusionPlan, OcclusionSource, Samples, ScenePlan,
+    StageRef,
 };
 use crate::occlusion::exact;
 use crate::pipeline::error::Invalid;
@@ -99,9 +99,6 @@ fn written(spec: &OcclusionSpec) -> impl Iterator<Item = &'static str> {
 fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Result<Computation, Invalid> {
     let refuse = |key: &str, message: String| Err(Invalid::new(format!("{path}.{key}"), message));
     let method = spec.method.unwrap_or_default();
-    if !METHODS.contains(&method) {
-        return refuse("method", format!("`{}` is not available in this version", method.as_str()));
-    }
     let count = |key: &str, n: u64| match n {
         1..=MAX_SAMPLES => Ok(n),
         _ => refuse(key, format!("expected 1 to {MAX_SAMPLES} samples, found {n}")).map(|_: Computation| 0),
