@@ -49,6 +49,8 @@ fn interrupted_runs_leave_nothing_behind() {
         assert!(left.iter().all(|name| FILES.contains(&name.as_str())), "{what}: {left:?}");
         assert!(!left.contains(&"image.vti".to_owned()), "{what}: {left:?}");
         let there = |name: &str| left.contains(&name.to_owned());
-        assert!(there("ao.f32.yaml") || !there("ao.f32"), "{what}: {left:?}");
+        for other in ["ao.f32.yaml", "ao.error.f32"] {
+            assert_eq!(there("ao.f32"), there(other), "{what}: {left:?}");
+        }
     }
 }
