@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation};
+use super::{Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding};
 use crate::geometry::{Vector, is_degenerate, narrow};
 
 /// Largest magnitude of a coordinate: determinants of four of them, and their squares, stay far from overflow.
@@ -58,6 +58,8 @@ impl<const D: usize> MeshBuilder<D> {
         }
         self.mesh.vertices.extend(surface.vertices.iter().map(narrow));
         self.mesh.simplices.extend(surface.simplices.iter().map(|s| s.map(|v| v + first_vertex as u32)));
+        let turned = rounding::turned_over(surface).into_iter().map(|s| s + first_simplex as u32);
+        self.mesh.turned_over.extend(turned);
         self.mesh.objects.push(Object {
             name: object(),
             color,

@@ -9,6 +9,7 @@
 //!   normals within one;
 //! - [`orientation`]: which components are closed, and which side of them is outside;
 //! - [`normals`]: measure-weighted vertex normals;
+//! - [`rounding`]: which simplices turn over when rounded;
 //! - simplices of measure zero, which no ray can hit.
 
 mod build;
@@ -17,6 +18,7 @@ pub mod identity;
 mod incidence;
 pub mod normals;
 pub mod orientation;
+pub mod rounding;
 mod surface;
 pub mod topology;
 
@@ -69,6 +71,8 @@ pub struct Mesh<const D: usize> {
     pub simplices: Vec<[u32; D]>,
     /// The simplices of measure zero, ascending. They are kept, but nothing hits them.
     pub degenerate: Vec<u32>,
+    /// The simplices that rounding to `f32` turned over or made flat, ascending.
+    pub turned_over: Vec<u32>,
     /// The objects, in order; their ranges cover all vertices and all simplices.
     pub objects: Vec<Object>,
 }

@@ -183,6 +183,18 @@ impl Run<'_> {
                 mesh.simplices.len()
             ));
         }
+        if let Some(&first) = mesh.turned_over.first() {
+            let object = &mesh.objects[mesh.object_of(first)].name;
+            let at = mesh.corners(first)[0];
+            let at: Vec<String> = at.iter().map(|x| x.to_string()).collect();
+            self.report.notes.push(format!(
+                "scene {id}: {} of {} simplices turned over or flat once rounded to single precision: they are thinner than \
+                 its steps there, and may shadow what is beside them (the first is number {first}, of {object}, near ({}))",
+                mesh.turned_over.len(),
+                mesh.simplices.len(),
+                at.join(", ")
+            ));
+        }
         let tracer = Tracer::new(mesh);
         let (hash, device, values) = (mesh.content_hash(), OnceCell::new(), BTreeMap::new());
         let mut scene = Scene { mesh, hash, tracer: &tracer, opencl: self.opencl, device, values };

@@ -19,6 +19,7 @@ use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
 use crate::mesh::Surface;
+use crate::mesh::rounding::turned_over;
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -163,6 +164,16 @@ impl Shape<'_> {
         }
     }
 
+    /// Which simplices fill a solid within triangles, one flag a simplex; none if the shape fills no such solid. Those lie
+    /// across the last axis, before the surface is placed.
+    fn solid_simplices<const D: usize>(&self, surface: &Surface<D>) -> Vec<bool> {
+        if !matches!(self, Shape::Extrude(spec) if spec.caps == Some(true)) {
+            return Vec::new();
+        }
+        let last = |v: u32| surface.vertices[v as usize][D - 1];
+        surface.simplices.iter().map(|simplex| simplex.iter().all(|&v| last(v) == last(simplex[0]))).collect()
+    }
+
     /// The surface, before it is placed.
     fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         match self {
@@ -238,6 +249,7 @@ pub fn build_object_with_notes<const D: usize>(
     let shape = spec.shape()?;
     spec.color.rgb()?;
     let mut surface = shape.build::<D>(folder, notes)?;
+    let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;
     // Coordinates are rounded to single precision afterwards and must survive that.
     let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);
@@ -249,5 +261,23 @@ pub fn build_object_with_notes<const D: usize>(
             format!("vertex {i} has {} = {:e}, beyond single precision (3.4e38)", AXES[axis], vertex[axis]),
         ));
     }
+    if !solid.is_empty() {
+        check_solid(&surface, &solid)?;
+    }
     Ok(surface)
+}
+
+/// Refuses a filled solid whose tetrahedra fold over when rounded: it would shadow itself.
+fn check_solid<const D: usize>(surface: &Surface<D>, solid: &[bool]) -> Result<(), Error> {
+    let turned: Vec<u32> = turned_over(surface).into_iter().filter(|&s| solid[s as usize]).collect();
+    let Some(&first) = turned.first() else { return Ok(()) };
+    let at: Vec<String> =
+        surface.vertices[surface.simplices[first as usize][0] as usize].iter().map(|x| format!("{x:.6}")).collect();
+    let message = format!(
+        "{} tetrahedra of the solid within fold over when rounded to single precision, the first near ({}): the mesh has \
+         parts too thin for its size and place; simplify it there, or move it nearer to the origin",
+        turned.len(),
+        at.join(", ")
+    );
+    Err(Error::invalid("extrude.caps", message))
 }
