@@ -16,6 +16,7 @@ mod build;
 mod error;
 pub mod identity;
 mod incidence;
+mod nesting;
 pub mod normals;
 pub mod orientation;
 pub mod rounding;

@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
-use super::Mesh;
-use crate::geometry::{Aabb, Cone, Vector, Vector64, determinant, plane_side, widen};
+use super::{Mesh, nesting};
+use crate::geometry::{Vector, Vector64, determinant, plane_side, widen};
 
 /// How the open components of an object are oriented.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,8 +130,10 @@ pub fn orient<const D: usize>(mesh: &mut Mesh<D>, simplices: Range<usize>, open:
     let (components, turned) = components(&corners);
     let wide = |s: u32| corners[s as usize].map(|v| widen(&mesh.vertices[v as usize]));
     let closed: Vec<&Component> = components.iter().filter(|c| c.closed).collect();
+    let points: Vec<[Vector<D>; D]> = corners.iter().map(|s| s.map(|v| mesh.vertices[v as usize])).collect();
+    let depths = nesting::depths(&points, &closed.iter().map(|c| &c.simplices[..]).collect::<Vec<_>>());
     let mut flip = vec![false; corners.len()];
-    for (i, component) in closed.iter().enumerate() {
+    for (component, depth) in closed.iter().zip(depths) {
         // D! times the enclosed measure, by the divergence theorem, about a corner of the component.
         let origin = wide(component.simplices[0])[0];
         let volume: f64 = (component.simplices.iter())
@@ -142,17 +144,15 @@ pub fn orient<const D: usize>(mesh: &mut Mesh<D>, simplices: Range<usize>, open:
             .sum();
         // det[v_i - p] is minus the height of p above the simplex: positive if the normal points away from p.
         let inward = volume < 0.0;
-        let others: Vec<&Component> = (closed.iter().enumerate()).filter(|(j, _)| *j != i).map(|(_, c)| *c).collect();
-        let cavity = nesting_depth(mesh, &corners, component, &others) % 2 == 1;
+        let cavity = depth % 2 == 1;
         for &s in &component.simplices {
             flip[s as usize] = turned[s as usize] ^ inward ^ cavity;
         }
     }
     if let Orientation::Facing(viewpoint) = open {
         for &s in components.iter().filter(|c| !c.closed).flat_map(|c| &c.simplices) {
-            let points = corners[s as usize].map(|v| mesh.vertices[v as usize]);
             flip[s as usize] = match viewpoint {
-                Viewpoint::Eye(eye) => plane_side(&points, eye) < 0,
+                Viewpoint::Eye(eye) => plane_side(&points[s as usize], eye) < 0,
                 Viewpoint::Direction(d) => crate::geometry::normal_of(&wide(s)).dot(&widen(d)) < 0.0,
             };
         }
@@ -162,33 +162,4 @@ pub fn orient<const D: usize>(mesh: &mut Mesh<D>, simplices: Range<usize>, open:
         simplex.swap(D - 2, D - 1);
     }
     counts
-}
-
-/// How many of the other closed components hold this one.
-fn nesting_depth<const D: usize>(
-    mesh: &Mesh<D>,
-    corners: &[[u32; D]],
-    inner: &Component,
-    others: &[&Component],
-) -> usize {
-    let points = |s: u32| corners[s as usize].map(|v| mesh.vertices[v as usize]);
-    let bounds = |c: &Component| Aabb::of(c.simplices.iter().flat_map(|&s| points(s)).collect::<Vec<_>>().iter());
-    if others.is_empty() {
-        return 0;
-    }
-    let inner_bounds = bounds(inner);
-    let holds = |outer: &Component| {
-        // Directions until one meets no facet; a corner that lies on the other component itself is passed over.
-        let mut candidates = inner.simplices.iter().take(8).flat_map(|&s| points(s));
-        candidates.find_map(|p| {
-            (1..32u32).find_map(|k| {
-                let direction = Vector::<D>::from_fn(|r, _| ((k * 37 + r as u32 * 101) % 64) as f32 - 31.37);
-                (outer.simplices.iter()).try_fold(false, |inside, &s| {
-                    let cone = Cone::of_simplex(&p, &points(s));
-                    cone.strictly_contains(&direction).map(|hit| inside ^ hit)
-                })
-            })
-        })
-    };
-    others.iter().filter(|o| bounds(o).contains(&inner_bounds)).filter(|o| holds(o) == Some(true)).count()
 }
