@@ -1,22 +1,23 @@
-//! The ways to ambient occlusion behind one door: at all vertices, or at a visible point.
+//! The one door to ambient occlusion: points in, values with their errors out.
 //!
-//! - Rays, a fixed number or until a target is met ([`Method::Sampled`]);
-//! - the closed form ([`Method::Exact`]);
-//! - the closed form where the view is simple, rays where it isn't ([`Method::Adaptive`]). Which of the two is decided by
-//!   the scene alone, never by a ray, so the values have no bias. Where few simplices are to be seen there is the most
+//! - Rays, a fixed number or until a target is met ([`Estimator::Sampled`]);
+//! - the closed form ([`Estimator::Exact`]);
+//! - the closed form where the view is simple, rays where it isn't ([`Estimator::Adaptive`]). Which of the two is decided
+//!   by the scene alone, never by a ray, so the values have no bias. Where few simplices are to be seen there is the most
 //!   to gain, as their silhouettes are long for what they cover, and points sent elsewhere say little about them;
-//! - the algorithm as it was published ([`Method::AsPublished`]), whose errors are those of its rays, not of its slips.
+//! - the algorithm as it was published ([`Estimator::AsPublished`]), whose errors are those of its rays, not of its
+//!   deviations.
+//!
+//! A new method is one more variant here, and one more arm in [`Estimator::estimate`].
 
-use super::exact::{self, Budget};
-use super::opencl::{self, Point};
-use super::vertices::{estimate_wanted, everywhere, spatial_order};
-use super::{Error, Estimate, Estimates, Level, Settings, Site, Slips, Stream, Target, as_published, estimate_at};
 use rayon::prelude::*;
 
+use super::as_published::{AsPublished, Deviations};
+use super::error::Error;
+use super::exact::{self, Budget};
 use crate::accel::Tracer;
-use crate::geometry::Vector;
-use crate::mesh::Incidence;
 use crate::progress::Progress;
+use crate::trace::{Estimate, RayBackend, Sampling, ShadingPoint};
 
 /// A view is simple if at most so many simplices rise above the horizon,
 const SIMPLE: usize = 64;
@@ -24,192 +25,178 @@ const SIMPLE: usize = 64;
 /// and cut each other into at most so many pieces: some milliseconds.
 const PIECES: Budget = Budget { cones: 8192 };
 
-/// Vertices between two looks at whether to go on, where some may take milliseconds.
+/// Points that a thread takes at once, where each may take milliseconds.
 const BATCH: usize = 4;
 
-/// A way to ambient occlusion.
+/// How ambient occlusion is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Method {
-    /// By `settings.samples` rays, or fewer if they meet the target.
-    Sampled(Settings, Option<Target>),
+pub enum Estimator {
+    /// By rays.
+    Sampled(Sampling),
     /// In closed form where that is cheap, else by rays; always by rays if distances are limited.
-    Adaptive(Settings, Option<Target>),
+    Adaptive(Sampling),
     /// In closed form.
     Exact(Budget),
-    /// The thesis's algorithm with these slips, by `settings.samples` rays.
-    AsPublished(Settings, Slips),
+    /// The thesis's algorithm with these deviations from the truth, by random rays; the target isn't asked. The thesis has
+    /// no values inside simplices; there plain rays stand in for its own.
+    AsPublished(Sampling, Deviations),
 }
 
-impl Method {
-    /// The value at every vertex.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`] if `progress` says so; [`Error::OverBudget`] if the closed form is too dear.
-    pub fn at_vertices<const D: usize>(&self, tracer: &Tracer<D>, progress: &dyn Progress) -> Result<Estimates, Error> {
-        self.at_wanted(tracer, None, progress)
-    }
+/// Values at points, in their order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimates {
+    /// Ambient occlusion.
+    pub values: Vec<f32>,
+    /// The standard error of each, 0 where it is known, NaN where nobody asked for it.
+    pub errors: Vec<f32>,
+    /// Rays asked in all.
+    pub rays: u64,
+}
 
-    /// [`Method::at_vertices`], but only at those that are wanted, if it is said which, one `bool` a vertex. There the
-    /// values are the same bits; elsewhere they are 1, with errors of NaN where rays are used.
+impl Estimates {
+    /// The root mean square of the errors, of those values that were asked for.
+    pub fn error(&self) -> f64 {
+        let (mut squares, mut count) = (0.0, 0usize);
+        for error in self.errors.iter().filter(|e| !e.is_nan()) {
+            squares += f64::from(*error).powi(2);
+            count += 1;
+        }
+        (squares / count.max(1) as f64).sqrt()
+    }
+}
+
+impl Estimator {
+    /// The values at these points, or at those where the mask is true. There they are the same bits with or without a
+    /// mask; elsewhere the value is 1 and the error NaN. A vertex that belongs to no simplex has the value 1. The result
+    /// is the same on any backend and any number of threads. Each point that is asked for is a step of `progress`.
     ///
     /// # Errors
-    /// Those of [`Method::at_vertices`].
-    pub fn at_wanted<const D: usize>(
+    /// [`Error::Cancelled`] if `progress` says so, soon, be it in the middle of a point; [`Error::OverBudget`] if the
+    /// closed form is too expensive at some point; [`Error::OpenCl`] if a device fails.
+    ///
+    /// # Panics
+    /// If the mask has another length than the points.
+    pub fn estimate<const D: usize>(
         &self,
-        tracer: &Tracer<D>,
-        wanted: Option<&[bool]>,
+        backend: &dyn RayBackend<D>,
+        points: &[ShadingPoint<D>],
+        mask: Option<&[bool]>,
         progress: &dyn Progress,
     ) -> Result<Estimates, Error> {
-        tracer.prepare();
-        match *self {
-            Self::Sampled(settings, target) => {
-                Ok(estimate_wanted(Level::best(), tracer, &settings, target, wanted, progress)?)
-            }
-            Self::Adaptive(settings, target) => {
-                let incidence = Incidence::new(tracer.mesh());
-                let estimate =
-                    |stream: &mut Stream<D>, vertex| adaptive(stream, tracer, &incidence, &settings, target, vertex);
-                Ok(everywhere(tracer, BATCH, wanted, progress, Stream::default, estimate)?)
-            }
-            Self::Exact(budget) => {
-                let values = exact::at_wanted(tracer, budget, wanted, progress)?;
-                let errors = vec![0.0; values.len()];
-                Ok(Estimates { values: values.into_iter().map(|v| v as f32).collect(), errors, rays: 0 })
-            }
-            Self::AsPublished(settings, slips) => {
-                let values = as_published::at_wanted(tracer, slips, &settings, wanted, progress)?;
-                let error = |(vertex, &value): (usize, &f32)| match wanted {
-                    Some(wanted) if !wanted[vertex] => f32::NAN,
-                    _ => Estimate::independent(value, settings.samples).error,
-                };
-                let errors = values.iter().enumerate().map(error).collect();
-                let asked = wanted.map_or(values.len(), |wanted| wanted.iter().filter(|&&w| w).count());
-                let rays = asked as u64 * u64::from(settings.samples);
-                Ok(Estimates { values, errors, rays })
-            }
-        }
-    }
-
-    /// [`Method::at_wanted`] with the rays on an OpenCL device: the same bits. What takes no rays, or the published ones,
-    /// stays on the processor.
-    ///
-    /// # Errors
-    /// Those of [`Method::at_vertices`], and [`Error::OpenCl`].
-    pub fn at_wanted_on<const D: usize>(
-        &self,
-        scene: &opencl::Scene<D>,
-        wanted: Option<&[bool]>,
-        progress: &dyn Progress,
-    ) -> Result<Estimates, Error> {
-        if matches!(self, Self::Exact(_) | Self::AsPublished(..)) {
-            return self.at_wanted(scene.tracer(), wanted, progress);
-        }
-        let mut order = spatial_order(scene.tracer());
-        let count = order.len();
-        order.retain(|&vertex| wanted.is_none_or(|wanted| wanted[vertex as usize]));
-        let points: Vec<Point<D>> = order.iter().map(|&vertex| Point::Vertex(vertex)).collect();
-        let found = self.at_points_on(scene, &points, progress)?;
+        assert!(mask.is_none_or(|mask| mask.len() == points.len()), "a mask says of each point whether it is asked for");
+        backend.tracer().prepare();
+        let order = spatial_order(backend.tracer(), points, mask);
+        let asked: Vec<ShadingPoint<D>> = order.iter().map(|&i| points[i]).collect();
+        let found = match *self {
+            Self::Sampled(sampling) => backend.open_fractions(&asked, &sampling, progress)?,
+            Self::Adaptive(sampling) => adaptive(backend, &asked, &sampling, progress)?,
+            Self::Exact(budget) => in_closed_form(backend.tracer(), &asked, budget, progress)
+                .map_err(|error| error.numbered(|place| order[place]))?,
+            Self::AsPublished(sampling, deviations) => published(backend, &asked, &sampling, deviations, progress)?,
+        };
+        let count = points.len();
         let mut estimates = Estimates { values: vec![1.0; count], errors: vec![f32::NAN; count], rays: 0 };
-        for (&vertex, estimate) in order.iter().zip(found) {
-            estimates.values[vertex as usize] = estimate.value;
-            estimates.errors[vertex as usize] = estimate.error;
+        for (&i, estimate) in order.iter().zip(found) {
+            estimates.values[i] = estimate.value;
+            estimates.errors[i] = estimate.error;
             estimates.rays += u64::from(estimate.rays);
         }
         Ok(estimates)
     }
+}
 
-    /// Whether it asks rays at visible points, which an OpenCL device may trace.
-    pub fn is_traced(&self) -> bool {
-        !matches!(self, Self::Exact(_))
-    }
-
-    /// The values at points, with the rays on an OpenCL device; in closed form only where [`Method::Adaptive`] takes it. None of
-    /// [`Method::Exact`], which asks no rays.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`] if `progress` says so, [`Error::OpenCl`] if a call fails.
-    pub fn at_points_on<const D: usize>(
-        &self,
-        scene: &opencl::Scene<D>,
-        points: &[Point<D>],
-        progress: &dyn Progress,
-    ) -> Result<Vec<Estimate>, Error> {
-        let (settings, target, closed) = match *self {
-            Self::Sampled(settings, target) => (settings, target, false),
-            Self::Adaptive(settings, target) => (settings, target, settings.max_distance == f32::INFINITY),
-            Self::AsPublished(settings, _) => (settings, None, false),
-            Self::Exact(_) => return Ok(Vec::new()),
-        };
-        if !closed {
-            return scene.estimate(points, &settings, target, progress);
+/// The places of the points that are asked for, those that are close in the hierarchy close to each other: then the nodes
+/// that one of them needs are still in the cache for the next.
+fn spatial_order<const D: usize>(tracer: &Tracer<D>, points: &[ShadingPoint<D>], mask: Option<&[bool]>) -> Vec<usize> {
+    const LAST: u32 = u32::MAX;
+    let mesh = tracer.mesh();
+    let (mut of_simplex, mut of_vertex) = (vec![LAST; mesh.simplices.len()], vec![LAST; mesh.vertices.len()]);
+    for (place, &simplex) in (0..).zip(&tracer.bvh().order) {
+        of_simplex[simplex as usize] = place;
+        for vertex in mesh.simplices[simplex as usize] {
+            let first = &mut of_vertex[vertex as usize];
+            *first = place.min(*first);
         }
-        let tracer = scene.tracer();
-        let incidence = Incidence::new(tracer.mesh());
-        let simple = |point: &Point<D>| {
-            if progress.cancelled() {
-                return Err(Error::Cancelled);
-            }
-            Ok(match point {
-                Point::Vertex(vertex) => exact::at_vertex_if_simple(tracer, &incidence, *vertex, SIMPLE, PIECES),
-                Point::Inside { position, normal, simplex, .. } => {
-                    exact::at_point_if_simple(tracer, position, normal, *simplex, SIMPLE, PIECES)
-                }
-            })
-        };
-        let known: Vec<Option<f64>> = points.par_iter().with_max_len(BATCH).map(simple).collect::<Result<_, _>>()?;
-        progress.advance(known.iter().flatten().count() as u64);
-        let rest: Vec<Point<D>> = points.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(p, _)| *p).collect();
-        let mut rest = scene.estimate(&rest, &settings, target, progress)?.into_iter();
-        Ok(known.into_iter().filter_map(|k| k.map(Estimate::known).or_else(|| rest.next())).collect())
     }
-
-    /// The value at a visible point inside a simplex, on the side that its normal points to. `number` tells points
-    /// apart, `place` names this one in errors. The thesis has no such values; plain rays stand in for its own.
-    ///
-    /// # Errors
-    /// [`Error::OverBudget`] if the closed form is too dear.
-    pub fn at_point<const D: usize>(
-        &self,
-        tracer: &Tracer<D>,
-        position: &Vector<D>,
-        normal: &Vector<D>,
-        simplex: u32,
-        number: u64,
-        place: impl FnOnce() -> String,
-    ) -> Result<Estimate, Error> {
-        let sampled = |settings: &Settings, target| {
-            let site = Site::inside_simplex(*position, *normal, simplex);
-            estimate_at(tracer, &site, settings, target, number)
-        };
-        Ok(match self {
-            Self::Sampled(settings, target) => sampled(settings, *target),
-            Self::AsPublished(settings, _) => sampled(settings, None),
-            Self::Adaptive(settings, target) => {
-                let closed = || exact::at_point_if_simple(tracer, position, normal, simplex, SIMPLE, PIECES);
-                let known = if settings.max_distance == f32::INFINITY { closed() } else { None };
-                known.map_or_else(|| sampled(settings, *target), Estimate::known)
-            }
-            Self::Exact(budget) => Estimate::known(exact::at_point(tracer, position, normal, simplex, *budget, place)?),
-        })
-    }
+    let place = |i: usize| match points[i] {
+        ShadingPoint::Vertex(vertex) => of_vertex[vertex as usize],
+        ShadingPoint::Inside { simplex, .. } => of_simplex.get(simplex as usize).copied().unwrap_or(LAST),
+    };
+    let asked = (0..points.len()).filter(|&i| mask.is_none_or(|mask| mask[i]));
+    let mut order: Vec<(u32, usize)> = asked.map(|i| (place(i), i)).collect();
+    order.par_sort_unstable();
+    order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// The value at a vertex in closed form where that is cheap, else by rays.
-pub fn adaptive<const D: usize>(
-    stream: &mut Stream<D>,
+/// In closed form where that is cheap, the rest by rays.
+fn adaptive<const D: usize>(
+    backend: &dyn RayBackend<D>,
+    points: &[ShadingPoint<D>],
+    sampling: &Sampling,
+    progress: &dyn Progress,
+) -> Result<Vec<Estimate>, Error> {
+    if sampling.max_distance != f32::INFINITY {
+        return Ok(backend.open_fractions(points, sampling, progress)?);
+    }
+    let closed = |point: &ShadingPoint<D>| {
+        let known = exact::value_if_simple(backend.tracer(), point, SIMPLE, PIECES, progress)?;
+        progress.advance(u64::from(known.is_some()));
+        Ok(known)
+    };
+    let known: Vec<Option<f64>> = points.par_iter().with_max_len(BATCH).map(closed).collect::<Result<_, Error>>()?;
+    let rest: Vec<ShadingPoint<D>> =
+        points.iter().zip(&known).filter(|(_, known)| known.is_none()).map(|(point, _)| *point).collect();
+    let mut rest = backend.open_fractions(&rest, sampling, progress)?.into_iter();
+    Ok(known.into_iter().filter_map(|known| known.map(Estimate::known).or_else(|| rest.next())).collect())
+}
+
+/// All in closed form.
+fn in_closed_form<const D: usize>(
     tracer: &Tracer<D>,
-    incidence: &Incidence,
-    settings: &Settings,
-    target: Option<Target>,
-    vertex: u32,
-) -> Estimate {
-    let unlimited = settings.max_distance == f32::INFINITY;
-    let known = unlimited.then(|| exact::at_vertex_if_simple(tracer, incidence, vertex, SIMPLE, PIECES)).flatten();
-    known.map_or_else(|| stream.estimate_at_vertex(tracer, incidence, settings, target, vertex), Estimate::known)
+    points: &[ShadingPoint<D>],
+    budget: Budget,
+    progress: &dyn Progress,
+) -> Result<Vec<Estimate>, Error> {
+    let value = |(place, point): (usize, &ShadingPoint<D>)| {
+        let value = exact::value(tracer, point, budget, progress).map_err(|stopped| match stopped {
+            exact::Stopped::Cancelled => Error::Cancelled,
+            exact::Stopped::OverBudget(source) => Error::OverBudget { point: place, place: name(point), source },
+        })?;
+        progress.advance(1);
+        Ok(Estimate::known(value))
+    };
+    points.par_iter().enumerate().with_max_len(1).map(value).collect()
 }
 
-impl From<Settings> for Method {
-    fn from(settings: Settings) -> Self {
-        Self::Sampled(settings, None)
+/// What a point is called if whoever asks has no better name.
+fn name<const D: usize>(point: &ShadingPoint<D>) -> String {
+    match point {
+        ShadingPoint::Vertex(vertex) => format!("vertex {vertex}"),
+        ShadingPoint::Inside { simplex, .. } => format!("a point of simplex {simplex}"),
     }
+}
+
+/// The published algorithm at vertices, plain rays inside simplices.
+fn published<const D: usize>(
+    backend: &dyn RayBackend<D>,
+    points: &[ShadingPoint<D>],
+    sampling: &Sampling,
+    deviations: Deviations,
+    progress: &dyn Progress,
+) -> Result<Vec<Estimate>, Error> {
+    let is_vertex = |point: &ShadingPoint<D>| matches!(point, ShadingPoint::Vertex(_));
+    let inside: Vec<ShadingPoint<D>> = points.iter().filter(|point| !is_vertex(point)).copied().collect();
+    let inside = backend.open_fractions(&inside, &Sampling { target: None, ..*sampling }, progress)?;
+    let published = AsPublished::new(backend.tracer(), deviations);
+    let value = |point: &ShadingPoint<D>| match *point {
+        ShadingPoint::Inside { .. } => Ok(None),
+        ShadingPoint::Vertex(vertex) => {
+            let value = published.at_vertex(vertex, sampling, progress)?;
+            progress.advance(1);
+            Ok(Some(Estimate::independent(value, sampling.samples)))
+        }
+    };
+    let found: Vec<Option<Estimate>> = points.par_iter().map(value).collect::<Result<_, Error>>()?;
+    let mut inside = inside.into_iter();
+    Ok(found.into_iter().filter_map(|found| found.or_else(|| inside.next())).collect())
 }

@@ -1,76 +1,65 @@
-//! A point at which ambient occlusion is asked for, and what its own surroundings hide.
+//! Where ambient occlusion is asked for: at a vertex of the mesh, or at a point inside one of its simplices.
 
-use crate::accel::Tracer;
-use crate::geometry::{Column, Cone, Frame, Ray, Vector, widen};
-use crate::mesh::{Incidence, Mesh};
+use crate::geometry::Vector;
+use crate::mesh::Mesh;
 
-/// What a simplex with a corner at the point hides: the cone of its edges from there and -normal. None if it is wholly
-/// below the tangent hyperplane, and hides nothing above it.
-pub(super) fn fold_cone<const D: usize>(
-    mesh: &Mesh<D>,
-    position: Vector<D>,
-    normal: Vector<D>,
-    identity: u32,
-    simplex: u32,
-) -> Option<Cone<D>> {
-    let mut columns = [Column::vector(-normal); D];
-    let mut rises = false;
-    let others = mesh.simplices[simplex as usize].into_iter();
-    for (column, v) in columns.iter_mut().zip(others.filter(|&v| mesh.identity[v as usize] != identity)) {
-        let other = mesh.vertices[v as usize];
-        *column = Column::edge(other, position);
-        let edge = widen(&other) - widen(&position);
-        rises |= edge.dot(&widen(&normal)) > 0.0;
-    }
-    rises.then(|| Cone::new(columns))
+/// A point at which ambient occlusion is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShadingPoint<const D: usize> {
+    /// A vertex of the mesh, with its normal. The simplices around it hide what lies behind them ([`super::Surroundings`]).
+    Vertex(u32),
+    /// A visible point inside a simplex, on the side that the normal points to. That simplex hides nothing.
+    Inside {
+        /// Where it is.
+        position: Vector<D>,
+        /// The middle of the hemisphere; of length 1.
+        normal: Vector<D>,
+        /// The simplex; [`super::NOTHING`] if it is inside none.
+        simplex: u32,
+        /// Tells points apart: each number has its own rays.
+        number: u64,
+    },
 }
 
-/// A shading point: a place, a normal, and the simplices around it that rays can't be traced against.
-#[derive(Clone, Debug)]
-pub struct Site<const D: usize> {
-    /// Where the rays start.
-    pub position: Vector<D>,
-    /// The middle of the hemisphere; of length 1.
-    pub normal: Vector<D>,
-    /// The simplices with a corner here that may block something, each as its edges from here and -normal.
-    fold: Vec<Cone<D>>,
-    /// The simplex this point is inside of.
-    ignored: Option<u32>,
-}
-
-impl<const D: usize> Site<D> {
-    /// A vertex of the mesh, seen as `vertex` of its object.
-    pub fn at_vertex(tracer: &Tracer<D>, incidence: &Incidence, vertex: u32) -> Self {
-        let mesh = tracer.mesh();
-        let position = mesh.vertices[vertex as usize];
-        let normal = mesh.normals[vertex as usize];
-        let identity = mesh.identity[vertex as usize];
-        let fold = (incidence.around(identity).iter())
-            .filter_map(|&simplex| fold_cone(mesh, position, normal, identity, simplex))
-            .collect();
-        Self { position, normal, fold, ignored: None }
+impl<const D: usize> ShadingPoint<D> {
+    /// All vertices of a mesh.
+    pub fn vertices(mesh: &Mesh<D>) -> Vec<Self> {
+        (0..mesh.vertices.len() as u32).map(Self::Vertex).collect()
     }
 
-    /// A visible point inside a simplex, on the side that its normal points to.
-    pub fn inside_simplex(position: Vector<D>, normal: Vector<D>, simplex: u32) -> Self {
-        Self { position, normal, fold: Vec::new(), ignored: Some(simplex) }
-    }
-
-    /// Its local frame.
-    pub fn frame(&self) -> Frame<D> {
-        Frame::new(&self.normal)
-    }
-
-    /// Whether the simplices with a corner here hide the ray's direction.
+    /// Where it is.
     #[inline]
-    pub(super) fn hides(&self, ray: &Ray<D>) -> bool {
-        self.fold.iter().any(|cone| cone.contains(&ray.direction))
+    pub fn position(&self, mesh: &Mesh<D>) -> Vector<D> {
+        match self {
+            Self::Vertex(vertex) => mesh.vertices[*vertex as usize],
+            Self::Inside { position, .. } => *position,
+        }
     }
 
-    /// The visibility V of a direction: whether a ray escapes, or reaches `limit`.
+    /// The middle of its hemisphere; zero for a vertex that belongs to no simplex.
     #[inline]
-    pub fn is_visible(&self, tracer: &Tracer<D>, direction: Vector<D>, limit: f32) -> bool {
-        let ray = Ray::new(self.position, direction);
-        !self.hides(&ray) && !tracer.occluded(&ray, limit, self.ignored)
+    pub fn normal(&self, mesh: &Mesh<D>) -> Vector<D> {
+        match self {
+            Self::Vertex(vertex) => mesh.normals[*vertex as usize],
+            Self::Inside { normal, .. } => *normal,
+        }
+    }
+
+    /// The simplex that hides nothing, if any.
+    #[inline]
+    pub fn ignored(&self) -> Option<u32> {
+        match self {
+            Self::Vertex(_) => None,
+            Self::Inside { simplex, .. } => Some(*simplex),
+        }
+    }
+
+    /// What tells its rays from those of other points.
+    #[inline]
+    pub fn number(&self) -> u64 {
+        match self {
+            Self::Vertex(vertex) => u64::from(*vertex),
+            Self::Inside { number, .. } => *number,
+        }
     }
 }

@@ -1,171 +1,92 @@
-//! The closed form among the simplices of a mesh: at a vertex, at a visible point, at all vertices on all cores.
+//! The closed form among the simplices of a mesh: what is to be seen from a shading point, and what it leaves open.
 //!
 //! The hierarchy serves as a sieve only. A box that lies wholly below the horizon holds simplices that hide nothing, so
 //! these need not be looked at one by one; what is left is handed to the [`Hemisphere`], which decides by exact signs.
 
-use rayon::prelude::*;
-
-use super::{Budget, Hemisphere};
+use super::exposed::LOOK;
+use super::hemisphere::{Budget, Hemisphere, Stopped};
 use crate::accel::{Bvh, Tracer};
 use crate::geometry::{Aabb, Vector};
-use crate::mesh::Incidence;
-use crate::occlusion::Error;
-use crate::progress::Progress;
+use crate::progress::{Cancelled, Progress, Silent};
+use crate::trace::ShadingPoint;
 
-/// The value at a vertex as [`at_vertex`] gives it, if at most `most` simplices rise above its horizon and their view
-/// stays within the budget.
-pub fn at_vertex_if_simple<const D: usize>(
+/// The value at a point, within [0, 1]. A vertex that belongs to no simplex has the value 1.
+pub(in crate::occlusion) fn value<const D: usize>(
     tracer: &Tracer<D>,
-    incidence: &Incidence,
-    vertex: u32,
-    most: usize,
-    budget: Budget,
-) -> Option<f64> {
-    if tracer.mesh().normals[vertex as usize].amax() == 0.0 {
-        return Some(1.0);
-    }
-    let view = view_of_vertex(tracer, incidence, vertex, most)?;
-    Some(view.visible_fraction(budget).ok()?.clamp(0.0, 1.0))
-}
-
-/// The same for [`at_point`].
-pub fn at_point_if_simple<const D: usize>(
-    tracer: &Tracer<D>,
-    position: &Vector<D>,
-    normal: &Vector<D>,
-    ignored: u32,
-    most: usize,
-    budget: Budget,
-) -> Option<f64> {
-    let view = view_of_point(tracer, position, normal, ignored, most)?;
-    Some(view.visible_fraction(budget).ok()?.clamp(0.0, 1.0))
-}
-
-/// The value at a vertex, within [0, 1]. A vertex that belongs to no simplex has the value 1.
-///
-/// # Errors
-/// [`Error::OverBudget`] if the view from there is too rich.
-pub fn at_vertex<const D: usize>(
-    tracer: &Tracer<D>,
-    incidence: &Incidence,
-    vertex: u32,
-    budget: Budget,
-) -> Result<f64, Error> {
-    let view = view_of_vertex(tracer, incidence, vertex, usize::MAX);
-    view.map_or(Ok(1.0), |hemisphere| value(&hemisphere, budget, || format!("vertex {vertex}")))
-}
-
-/// The value at a point inside the simplex `ignored`, on the side that its normal points to, within [0, 1]. `place`
-/// names the point if it is over budget.
-///
-/// # Errors
-/// [`Error::OverBudget`] if the view from there is too rich.
-pub fn at_point<const D: usize>(
-    tracer: &Tracer<D>,
-    position: &Vector<D>,
-    normal: &Vector<D>,
-    ignored: u32,
-    budget: Budget,
-    place: impl FnOnce() -> String,
-) -> Result<f64, Error> {
-    let view = view_of_point(tracer, position, normal, ignored, usize::MAX);
-    view.map_or(Ok(1.0), |hemisphere| value(&hemisphere, budget, place))
-}
-
-/// The value at every vertex of the mesh, in vertex order: the same on any number of threads.
-///
-/// # Errors
-/// [`Error::OverBudget`] with the lowest such vertex of those that were tried, or [`Error::Cancelled`].
-pub fn at_vertices<const D: usize>(
-    tracer: &Tracer<D>,
+    point: &ShadingPoint<D>,
     budget: Budget,
     progress: &dyn Progress,
-) -> Result<Vec<f64>, Error> {
-    at_wanted(tracer, budget, None, progress)
-}
-
-/// [`at_vertices`] at those that are wanted, and 1 elsewhere.
-pub(in super::super) fn at_wanted<const D: usize>(
-    tracer: &Tracer<D>,
-    budget: Budget,
-    wanted: Option<&[bool]>,
-    progress: &dyn Progress,
-) -> Result<Vec<f64>, Error> {
-    tracer.prepare();
-    let incidence = Incidence::new(tracer.mesh());
-    let vertices = 0..tracer.mesh().vertices.len() as u32;
-    let found = vertices.into_par_iter().with_max_len(1).map(|vertex| {
-        if progress.cancelled() {
-            return Err(Error::Cancelled);
-        }
-        if wanted.is_some_and(|wanted| !wanted[vertex as usize]) {
-            return Ok(1.0);
-        }
-        let value = at_vertex(tracer, &incidence, vertex, budget);
-        progress.advance(1);
-        value
-    });
-    found.collect()
-}
-
-fn value<const D: usize>(
-    hemisphere: &Hemisphere<D>,
-    budget: Budget,
-    place: impl FnOnce() -> String,
-) -> Result<f64, Error> {
-    match hemisphere.visible_fraction(budget) {
+) -> Result<f64, Stopped> {
+    match view(tracer, point, usize::MAX, progress)? {
         // Rounding may leave it some 1e-15 outside.
-        Ok(value) => Ok(value.clamp(0.0, 1.0)),
-        Err(source) => Err(Error::OverBudget { place: place(), source }),
+        Some(hemisphere) => Ok(hemisphere.fraction(budget, progress)?.clamp(0.0, 1.0)),
+        None => Ok(1.0),
     }
 }
 
-/// The hemisphere over a vertex with all that occludes it. None if more than `most` simplices do, or if there is no normal.
-fn view_of_vertex<const D: usize>(
+/// The value at a point, if at most `most` simplices rise above its horizon and their view stays within the budget.
+pub(in crate::occlusion) fn value_if_simple<const D: usize>(
     tracer: &Tracer<D>,
-    incidence: &Incidence,
-    vertex: u32,
+    point: &ShadingPoint<D>,
     most: usize,
-) -> Option<Hemisphere<D>> {
-    let mesh = tracer.mesh();
-    let (position, normal) = (&mesh.vertices[vertex as usize], &mesh.normals[vertex as usize]);
-    let identity = mesh.identity[vertex as usize];
-    let mut hemisphere = Hemisphere::new(position, normal)?;
-    let around = incidence.around(identity);
-    for &simplex in around {
-        let mut others = [*position; D];
-        let corners = mesh.simplices[simplex as usize].into_iter();
-        for (other, v) in others.iter_mut().zip(corners.filter(|&v| mesh.identity[v as usize] != identity)) {
-            *other = mesh.vertices[v as usize];
-        }
-        // The coordinates of a mesh are finite, so nothing is refused.
-        let _ = hemisphere.add_incident(&others[..D - 1]);
+    budget: Budget,
+    progress: &dyn Progress,
+) -> Result<Option<f64>, Cancelled> {
+    if point.normal(tracer.mesh()).amax() == 0.0 {
+        return Ok(Some(1.0));
     }
-    let few = above_horizon(tracer.bvh(), position, normal, |simplex| {
-        if around.binary_search(&simplex).is_err() {
+    let Some(hemisphere) = view(tracer, point, most, progress)? else { return Ok(None) };
+    match hemisphere.fraction(budget, progress) {
+        Ok(value) => Ok(Some(value.clamp(0.0, 1.0))),
+        Err(Stopped::OverBudget(_)) => Ok(None),
+        Err(Stopped::Cancelled) => Err(Cancelled),
+    }
+}
+
+impl<const D: usize> Hemisphere<D> {
+    /// The hemisphere over a shading point with all that occludes it. None if there is no normal.
+    pub fn over(tracer: &Tracer<D>, point: &ShadingPoint<D>) -> Option<Self> {
+        view(tracer, point, usize::MAX, &Silent).ok().flatten()
+    }
+}
+
+/// The hemisphere over a point with all that occludes it. None if more than `most` simplices do, or if there is no normal.
+fn view<const D: usize>(
+    tracer: &Tracer<D>,
+    point: &ShadingPoint<D>,
+    most: usize,
+    progress: &dyn Progress,
+) -> Result<Option<Hemisphere<D>>, Cancelled> {
+    let mesh = tracer.mesh();
+    let (position, normal) = (point.position(mesh), point.normal(mesh));
+    let Some(mut hemisphere) = Hemisphere::new(&position, &normal) else { return Ok(None) };
+    // The coordinates of a mesh are finite, so nothing is refused below.
+    let own: &[u32] = match point {
+        ShadingPoint::Vertex(vertex) => {
+            let identity = mesh.identity[*vertex as usize];
+            let around = tracer.incidence().around(identity);
+            for &simplex in around {
+                let mut others = [position; D];
+                let corners = mesh.simplices[simplex as usize].into_iter();
+                for (other, v) in others.iter_mut().zip(corners.filter(|&v| mesh.identity[v as usize] != identity)) {
+                    *other = mesh.vertices[v as usize];
+                }
+                let _ = hemisphere.add_incident(&others[..D - 1]);
+            }
+            around
+        }
+        ShadingPoint::Inside { simplex, .. } => std::slice::from_ref(simplex),
+    };
+    let (mut looked, mut cancelled) = (0usize, progress.cancelled());
+    let all = above_horizon(tracer.bvh(), &position, &normal, |simplex| {
+        if own.binary_search(&simplex).is_err() {
             let _ = hemisphere.add(&mesh.corners(simplex));
         }
-        hemisphere.occluders() <= most
+        looked += 1;
+        cancelled |= looked.is_multiple_of(LOOK) && progress.cancelled();
+        hemisphere.occluders() <= most && !cancelled
     });
-    few.then_some(hemisphere)
-}
-
-/// The same over a point inside a simplex.
-fn view_of_point<const D: usize>(
-    tracer: &Tracer<D>,
-    position: &Vector<D>,
-    normal: &Vector<D>,
-    ignored: u32,
-    most: usize,
-) -> Option<Hemisphere<D>> {
-    let mut hemisphere = Hemisphere::new(position, normal)?;
-    let few = above_horizon(tracer.bvh(), position, normal, |simplex| {
-        if simplex != ignored {
-            let _ = hemisphere.add(&tracer.mesh().corners(simplex));
-        }
-        hemisphere.occluders() <= most
-    });
-    few.then_some(hemisphere)
+    if cancelled { Err(Cancelled) } else { Ok(all.then_some(hemisphere)) }
 }
 
 /// Calls `visit` for the items whose boxes may reach above the horizon, as long as it returns true; returns whether it
@@ -211,7 +132,6 @@ mod tests {
     use super::*;
     use crate::mesh::{Mesh, MeshBuilder, Orientation, Surface};
     use crate::occlusion::exact::visible_fraction;
-    use crate::progress::Silent;
 
     /// Simplices all over the place; many meet in a vertex.
     fn soup<const D: usize>(count: usize) -> Mesh<D> {
@@ -230,8 +150,9 @@ mod tests {
 
     fn sieve_changes_nothing<const D: usize>() {
         let mesh = soup::<D>(14);
-        let tracer = Tracer::new(&mesh);
-        let values = at_vertices(&tracer, Budget::default(), &Silent).unwrap();
+        let tracer = Tracer::new(mesh.clone());
+        let at = |point| value(&tracer, &point, Budget::default(), &Silent).unwrap();
+        let values: Vec<f64> = ShadingPoint::vertices(&mesh).into_iter().map(at).collect();
         assert!(values.iter().any(|&a| a < 0.9), "{values:?}");
         for (v, value) in values.iter().enumerate() {
             let vertex = mesh.vertices[v];
@@ -252,7 +173,7 @@ mod tests {
         }
         let point = (0..D).fold(Vector::zeros(), |p, i| p + mesh.corners(3)[i] / D as f32);
         let normal = Vector::from_element(1.0);
-        let value = at_point(&tracer, &point, &normal, 3, Budget::default(), String::new).unwrap();
+        let value = at(ShadingPoint::Inside { position: point, normal, simplex: 3, number: 0 });
         let others = (0..mesh.simplices.len() as u32).filter(|&s| s != 3).map(|s| mesh.corners(s));
         let all = visible_fraction(&point, &normal, [], others, Budget::default()).unwrap().unwrap();
         assert!((value - all).abs() < 1e-13, "{D}: {value} {all}");
@@ -265,25 +186,10 @@ mod tests {
     }
 
     #[test]
-    fn over_budget_names_vertex_occluders_and_remedy() {
-        let mesh = soup::<4>(14);
-        let error = at_vertices(&Tracer::new(&mesh), Budget { cones: 20 }, &Silent).unwrap_err().to_string();
-        assert!(error.starts_with("vertex ") && error.contains("method: sobol"), "{error}");
-        assert!(error.contains(" simplices above the horizon") && error.contains("more than 20 cones"), "{error}");
-    }
-
-    #[test]
-    fn cancelling_is_heard() {
-        struct Impatient;
-        impl Progress for Impatient {
-            fn begin(&self, _: &str, _: u64) {}
-            fn advance(&self, _: u64) {}
-            fn end(&self) {}
-            fn cancelled(&self) -> bool {
-                true
-            }
-        }
-        let mesh = soup::<3>(14);
-        assert_eq!(at_vertices(&Tracer::new(&mesh), Budget::default(), &Impatient), Err(Error::Cancelled));
+    fn over_budget_is_told() {
+        let tracer = Tracer::new(soup::<4>(14));
+        let found = (0..14).map(|v| value(&tracer, &ShadingPoint::Vertex(v), Budget { cones: 20 }, &Silent));
+        let told = found.filter_map(Result::err).next().unwrap();
+        assert!(matches!(&told, Stopped::OverBudget(over) if over.budget.cones == 20 && over.occluders > 0), "{told:?}");
     }
 }
