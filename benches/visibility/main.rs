@@ -16,10 +16,10 @@ use std::time::Instant;
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation};
-use ao4d::occlusion::{Sampler, Settings, at_vertices};
+use ao4d::occlusion::{Estimates, Sampler, Settings, at_vertices};
 use ao4d::progress::Silent;
 use ao4d::render::visibility::Method;
-use ao4d::render::{Camera, Channel, NOTHING, Picture, Projection, Shading, View};
+use ao4d::render::{Aov, Camera, NOTHING, Projection, Renderer, Shading, View};
 use ao4d::scene::{ObjectSpec, build_object};
 use rustix::time::{ClockId, clock_gettime};
 
@@ -94,11 +94,17 @@ fn main() {
                             time(|| visibility.first_hits(layers(), &Silent).expect("nobody cancels"));
                         row(way, prepare, wall, cpu, hits.iter().filter(|&&s| s != NOTHING).count());
                     }
-                    let values = vec![0.5; mesh.vertices.len()];
-                    let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading: Shading::Smooth(&values), device: None };
-                    let channels = [Channel::Rgba, Channel::AmbientOcclusion, Channel::Opacity];
-                    let (_, wall, cpu) = time(|| picture.slab(0..grid.dimensions[2], &channels, &Silent).expect("a picture"));
-                    row("with shade", 0.0, wall, cpu, 0);
+                    let count = mesh.vertices.len();
+                    let estimates = Estimates { values: vec![0.5; count], errors: vec![0.0; count], rays: 0 };
+                    let shading = Shading::Smooth(&estimates);
+                    let mut renderer = Renderer::new(&tracer, camera.clone(), grid.dimensions, shading);
+                    let aovs = [Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity];
+                    for supersample in [1, 2, 3] {
+                        renderer.supersample = supersample;
+                        let slab = |_| Ok::<(), ao4d::occlusion::Error>(());
+                        let (_, wall, cpu) = time(|| renderer.render(&aovs, None, &Silent, slab).expect("a picture"));
+                        row(&format!("shaded, {supersample}"), 0.0, wall, cpu, 0);
+                    }
                     let sobol = Settings { sampler: Sampler::Sobol, samples: 64, seed: 1, max_distance: f32::INFINITY };
                     let start = Instant::now();
                     tracer.prepare_wide();

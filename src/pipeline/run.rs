@@ -26,7 +26,7 @@ use crate::mesh::Mesh;
 use crate::occlusion::opencl::{self, OpenCl};
 use crate::occlusion::{self, Cancelled, Estimates};
 use crate::progress::Progress;
-use crate::render::{CameraError, NOTHING, Picture, Shading, Visibility};
+use crate::render::{CameraError, NOTHING, Renderer, Shading, Visibility};
 
 /// A run that didn't succeed.
 #[derive(Debug, thiserror::Error)]
@@ -361,24 +361,19 @@ impl Run<'_> {
             self.values(o, scene)?;
         }
         let camera = camera::<D>(&render.camera)?;
-        let grid = camera.grid(render.dimensions);
-        let device = scene.device()?;
         let shading = shading(plan, render, &scene.values);
-        let picture = Picture { tracer: scene.tracer, grid, camera, shading, device };
+        let mut picture = Renderer::new(scene.tracer, camera, render.dimensions, shading);
+        (picture.device, picture.visibility) = (scene.device()?, render.visibility);
         let start = Instant::now();
-        let visibility = picture.visibility(render.visibility);
-        let mut files = PictureFiles::create(plan, index, &self.stale, &grid, &scene.hash)?;
+        let mut files = PictureFiles::create(plan, index, &self.stale, &picture.grid, &scene.hash)?;
         let channels = files.channels().to_vec();
-        let thick = picture.layers_within(SLAB_BYTES, &channels);
-        let depth = grid.dimensions[2];
         // Two passes over the voxels: what is seen, and its shade.
         self.progress.begin(&format!("render {}", render.id), 2 * render.voxels());
         let mut seen = 0;
-        for first in (0..depth).step_by(thick) {
-            let layers = first..depth.min(first + thick);
-            let slab = picture.slab_of(&visibility, layers, &channels, self.progress)?;
-            seen += files.add_slab(first, &slab)?;
-        }
+        picture.render(&channels, None, self.progress, |slab| -> Result<(), RunError> {
+            seen += slab.seen;
+            Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
+        })?;
         self.progress.end();
         let rendering = start.elapsed();
         for (write, kind, file, bytes) in files.finish()? {
@@ -450,7 +445,7 @@ fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Est
     let Some(o) = render.occlusion else { return Shading::None };
     match (render.shading, &plan.occlusions[o].source) {
         (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(method(computation)),
-        (spec::Shading::Flat, _) => Shading::Flat(&values[&o].values),
-        _ => Shading::Smooth(&values[&o].values),
+        (spec::Shading::Flat, _) => Shading::Flat(&values[&o]),
+        _ => Shading::Smooth(&values[&o]),
     }
 }

@@ -8,12 +8,12 @@ use std::time::Instant;
 use super::Errors;
 use crate::accel::Tracer;
 use crate::occlusion::exact::Budget;
-use crate::occlusion::{self, Error, Method, Sampler, Settings};
+use crate::occlusion::{Error, Method, Sampler, Settings};
 use crate::pipeline::RunError;
 use crate::pipeline::build::camera;
 use crate::pipeline::plan::RenderPlan;
 use crate::progress::{Progress, Silent};
-use crate::render::{Channel, Picture, Shading};
+use crate::render::{Aov, Renderer, Shading};
 use crate::volume::{Array, Values};
 
 /// At most about so many voxels.
@@ -64,12 +64,11 @@ pub fn measure<const D: usize>(
 ) -> Result<Option<Pictures>, RunError> {
     let dimensions = reduced(render.dimensions);
     let camera = camera::<D>(&render.camera)?;
-    let grid = camera.grid(dimensions);
     // Each is cancelled by the outer progress, and told as one step of it.
     let watch = Steps(progress);
     let image = |shading: Shading| -> Result<Vec<Array>, Error> {
-        let picture = Picture { tracer, camera: camera.clone(), grid, shading, device: None };
-        picture.slab(0..dimensions[2], &[Channel::AmbientOcclusion, Channel::Opacity], &watch)
+        let renderer = Renderer::new(tracer, camera.clone(), dimensions, shading);
+        Ok(renderer.volume(&[Aov::AmbientOcclusion, Aov::Opacity], &watch)?.arrays)
     };
     let settings = |samples| Settings { sampler: Sampler::Sobol, samples, seed, max_distance: f32::INFINITY };
     let vertex_samples = [16, 64, 256, 1024];
@@ -103,7 +102,7 @@ pub fn measure<const D: usize>(
     for shading in ["flat", "smooth"] {
         for samples in vertex_samples {
             let (arrays, seconds) = timed(|| {
-                let values = occlusion::at_vertices(tracer, &settings(samples), &watch)?;
+                let values = Method::from(settings(samples)).at_vertices(tracer, &watch)?;
                 image(if shading == "flat" { Shading::Flat(&values) } else { Shading::Smooth(&values) })
             })?;
             add(shading, samples, seconds, &arrays);
