@@ -83,7 +83,10 @@ impl Estimator {
         mask: Option<&[bool]>,
         progress: &dyn Progress,
     ) -> Result<Estimates, Error> {
-        assert!(mask.is_none_or(|mask| mask.len() == points.len()), "a mask says of each point whether it is asked for");
+        assert!(
+            mask.is_none_or(|mask| mask.len() == points.len()),
+            "a mask says of each point whether it is asked for"
+        );
         backend.tracer().prepare();
         let order = spatial_order(backend.tracer(), points, mask);
         let asked: Vec<ShadingPoint<D>> = order.iter().map(|&i| points[i]).collect();

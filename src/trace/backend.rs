@@ -45,12 +45,7 @@ pub trait RayBackend<const D: usize>: Debug + Send + Sync {
     ///
     /// # Panics
     /// If `after` has another length than `rays`.
-    fn first_hits(
-        &self,
-        rays: &[Ray<D>],
-        after: Option<&[u32]>,
-        progress: &dyn Progress,
-    ) -> Result<Vec<u32>, Error>;
+    fn first_hits(&self, rays: &[Ray<D>], after: Option<&[u32]>, progress: &dyn Progress) -> Result<Vec<u32>, Error>;
 
     /// Ambient occlusion at each point, in their order: the share of its cosine-weighted rays that escape. Points that lie
     /// close together should stand close together. Each is a step of `progress`.

@@ -118,7 +118,8 @@ impl<'t, const D: usize> AsPublished<'t, D> {
         if normal.amax() == 0.0 {
             return Ok(1.0);
         }
-        let own = (!self.deviations.own_simplices).then(|| Surroundings::of(self.tracer, &ShadingPoint::Vertex(vertex)));
+        let own =
+            (!self.deviations.own_simplices).then(|| Surroundings::of(self.tracer, &ShadingPoint::Vertex(vertex)));
         let mut sequence = Sequence::new(Sampler::Random, sampling.seed, u64::from(vertex));
         let origin = self.tracer.mesh().vertices[vertex as usize];
         let frame = Frame::new(normal);

@@ -190,6 +190,9 @@ mod tests {
         let tracer = Tracer::new(soup::<4>(14));
         let found = (0..14).map(|v| value(&tracer, &ShadingPoint::Vertex(v), Budget { cones: 20 }, &Silent));
         let told = found.filter_map(Result::err).next().unwrap();
-        assert!(matches!(&told, Stopped::OverBudget(over) if over.budget.cones == 20 && over.occluders > 0), "{told:?}");
+        assert!(
+            matches!(&told, Stopped::OverBudget(over) if over.budget.cones == 20 && over.occluders > 0),
+            "{told:?}"
+        );
     }
 }

@@ -51,12 +51,7 @@ impl<const D: usize> RayBackend<D> for CpuBackend<D> {
         &self.tracer
     }
 
-    fn first_hits(
-        &self,
-        rays: &[Ray<D>],
-        after: Option<&[u32]>,
-        progress: &dyn Progress,
-    ) -> Result<Vec<u32>, Error> {
+    fn first_hits(&self, rays: &[Ray<D>], after: Option<&[u32]>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         Ok(scalar::first_hits(&self.tracer, rays, after, progress)?)
     }
 

@@ -59,12 +59,7 @@ impl<const D: usize> RayBackend<D> for ScalarBackend<D> {
         &self.tracer
     }
 
-    fn first_hits(
-        &self,
-        rays: &[Ray<D>],
-        after: Option<&[u32]>,
-        progress: &dyn Progress,
-    ) -> Result<Vec<u32>, Error> {
+    fn first_hits(&self, rays: &[Ray<D>], after: Option<&[u32]>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         Ok(first_hits(&self.tracer, rays, after, progress)?)
     }
 

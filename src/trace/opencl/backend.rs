@@ -307,8 +307,7 @@ fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, matrices
         Frame::new(&normal)
     };
     let sequence = |point| Sequence::new(Sampler::Sobol, 1, point);
-    let points: Vec<layout::Point> =
-        (0..POINTS).map(|point| sampled_point(&frame(point), &sequence(point))).collect();
+    let points: Vec<layout::Point> = (0..POINTS).map(|point| sampled_point(&frame(point), &sequence(point))).collect();
     let count = (POINTS * u64::from(RAYS)) as usize;
     let (points, out) = (device.input(&points, "points")?, device.output::<Float4>(count, "results")?);
     let arguments = [points.argument(), matrices.argument(), Argument::U32(RAYS), out.argument()];

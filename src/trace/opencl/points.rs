@@ -79,12 +79,7 @@ impl<const D: usize> OpenClBackend<D> {
     }
 
     /// All points of a chunk: those that need more rays go on together, each with as many as the others.
-    fn estimate_chunk(
-        &self,
-        on: &Part,
-        chunk: &Chunk<D>,
-        progress: &dyn Progress,
-    ) -> Result<Vec<Estimate>, Error> {
+    fn estimate_chunk(&self, on: &Part, chunk: &Chunk<D>, progress: &dyn Progress) -> Result<Vec<Estimate>, Error> {
         let sampling = chunk.sampling;
         let run = |p: &Prepared<D>| Running {
             sequence: Sequence::new(sampling.sampler, sampling.seed, p.number),
@@ -97,11 +92,14 @@ impl<const D: usize> OpenClBackend<D> {
         progress.advance((open.len() - active.len()) as u64);
         let mut done = 0;
         while !active.is_empty() {
-            let step = sampling.target.map_or(sampling.samples, |_| done.max(Target::FEWEST)).min(sampling.samples - done);
+            let step =
+                sampling.target.map_or(sampling.samples, |_| done.max(Target::FEWEST)).min(sampling.samples - done);
             self.trace(on, chunk, &active, step, &mut running, progress)?;
             done += step;
             let before = active.len();
-            let goes_on = |accumulator| done < sampling.samples && sampling.target.is_none_or(|target| !target.is_met(accumulator));
+            let goes_on = |accumulator| {
+                done < sampling.samples && sampling.target.is_none_or(|target| !target.is_met(accumulator))
+            };
             active.retain(|&i| goes_on(&running[i].accumulator));
             progress.advance((before - active.len()) as u64);
         }

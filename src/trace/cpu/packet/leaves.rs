@@ -86,12 +86,7 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
 
 /// Whether a ray hits a simplex of the leaf.
 #[inline(always)]
-pub(super) fn hits_of_one<L: Lanes, const D: usize>(
-    query: &Query<D>,
-    rays: &Rays<D>,
-    leaf: u32,
-    i: usize,
-) -> bool {
+pub(super) fn hits_of_one<L: Lanes, const D: usize>(query: &Query<D>, rays: &Rays<D>, leaf: u32, i: usize) -> bool {
     let leaf = &query.wide.leaves[leaf as usize];
     let mut size = leaf.reach;
     for k in 0..D {
@@ -132,13 +127,7 @@ fn exactly_one<const D: usize>(
 }
 
 #[cold]
-fn exactly_those<const D: usize>(
-    query: &Query<D>,
-    rays: &Rays<D>,
-    simplex: u32,
-    doubtful: u8,
-    group: usize,
-) -> u8 {
+fn exactly_those<const D: usize>(query: &Query<D>, rays: &Rays<D>, simplex: u32, doubtful: u8, group: usize) -> u8 {
     let hits = |n: &usize| query.tracer.hits(simplex, &query.ray(rays, group * WIDTH + n), query.limit);
     (0..WIDTH).filter(|n| doubtful >> n & 1 == 1).filter(hits).fold(0, |mask, n| mask | 1 << n)
 }
