@@ -91,7 +91,7 @@ fn minor<T: RealField + Copy, const D: usize>(
 mod tests {
     use super::*;
     use crate::geometry::determinant;
-    use crate::occlusion::{Sampler, Sequence};
+    use crate::trace::{Sampler, Sequence};
 
     fn determinants<const D: usize>() {
         let mut sequence = Sequence::new(Sampler::Random, 3, 4);
