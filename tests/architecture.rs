@@ -64,7 +64,13 @@ fn no_module_uses_one_above_or_beside_it() {
 }
 
 /// Circles that are still there, each by its files; one that is gone is to be crossed out here.
-const KNOWN_CIRCLES: &[&[&str]] = &[];
+const KNOWN_CIRCLES: &[&[&str]] = &[
+    &["cli/console.rs", "cli/options.rs"],
+    &["pipeline/figure.rs", "pipeline/limits.rs", "pipeline/run.rs"],
+    &["pipeline/plan/occlusion.rs", "pipeline/plan/render.rs", "pipeline/plan/resolve.rs", "pipeline/plan/write.rs"],
+    &["render/occlude.rs", "render/renderer.rs"],
+    &["scene/hypersphere.rs", "scene/polytope.rs"],
+];
 
 /// Source text without comments, strings and tests.
 fn plain(text: &str) -> String {
@@ -174,7 +180,8 @@ impl Crate {
         path
     }
 
-    /// The modules that a module's own code uses; what it only hands on doesn't count.
+    /// The modules that a module's own code uses. What it only hands on doesn't count, and neither does what a part uses of
+    /// the module that it is a part of.
     fn used_by(&self, module: &[String]) -> BTreeSet<Vec<String>> {
         let text = &self.texts[module];
         let mut paths: Vec<Vec<String>> = Vec::new();
@@ -188,7 +195,7 @@ impl Crate {
         let is_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
         paths.extend(rest.split(|c| !is_path(c)).filter(|word| word.contains("::")).map(segments));
         let owners = paths.iter().filter_map(|path| self.absolute(module, path)).map(|path| self.owner(&path));
-        owners.filter(|owner| owner[..] != *module).collect()
+        owners.filter(|owner| !module.starts_with(owner)).collect()
     }
 }
 

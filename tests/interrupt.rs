@@ -30,12 +30,7 @@ impl Progress for Watch {
 }
 
 /// Seconds from the wish to stop, uttered a while after the start, to the end.
-fn stops<const D: usize>(
-    what: &str,
-    estimator: Estimator,
-    backend: &dyn RayBackend<D>,
-    points: &[ShadingPoint<D>],
-) {
+fn stops<const D: usize>(what: &str, estimator: Estimator, backend: &dyn RayBackend<D>, points: &[ShadingPoint<D>]) {
     backend.tracer().prepare_wide();
     let watch = Watch(AtomicBool::new(false));
     let (found, seconds) = std::thread::scope(|scope| {
