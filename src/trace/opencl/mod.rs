@@ -1,4 +1,4 @@
-//! Ambient occlusion, and what voxels see, on any OpenCL device: the same bits as on the processor.
+//! First hits and open fractions on any OpenCL device: the same bits as on the processor.
 //!
 //! What a ray hits is defined by exact signs. A device settles nearly all rays in single precision, beside a bound on the
 //! rounding, some more in double precision if it has that, and leaves the rest to the host, which decides exactly. So the

@@ -334,12 +334,12 @@ mod tests {
     use crate::trace::Sampler;
 
     fn same_bits<const D: usize>() {
-        for (site, sampler) in (0..300).flat_map(|site| [(site, Sampler::Sobol), (site, Sampler::Random)]) {
-            let normal = Vector::<D>::from_fn(|r, _| ((site * 7 + r as u64 * 13) % 11) as f32 - 4.9).normalize();
+        for (point, sampler) in (0..300).flat_map(|point| [(point, Sampler::Sobol), (point, Sampler::Random)]) {
+            let normal = Vector::<D>::from_fn(|r, _| ((point * 7 + r as u64 * 13) % 11) as f32 - 4.9).normalize();
             let frame = Frame::new(&normal);
-            let (mut slow, mut fast) = (Sequence::new(sampler, 9, site), Sequence::new(sampler, 9, site));
+            let (mut slow, mut fast) = (Sequence::new(sampler, 9, point), Sequence::new(sampler, 9, point));
             let mut rays = Rays::<D>::new();
-            for count in [64, 64, 64, (site % 64) as usize + 1] {
+            for count in [64, 64, 64, (point % 64) as usize + 1] {
                 let key = |d: &Vector<D>| d.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
                 let expected = (0..count).map(|_| Ray::new(Vector::zeros(), slow.next_direction(&frame)).direction);
                 let mut expected: Vec<_> = expected.map(|d| key(&d)).collect();
@@ -349,7 +349,7 @@ mod tests {
                     (0..count).map(|i| key(&Vector::from_fn(|k, _| rays.direction[k][i]))).collect();
                 expected.sort();
                 found.sort();
-                assert_eq!(found, expected, "{sampler:?} {site}");
+                assert_eq!(found, expected, "{sampler:?} {point}");
             }
         }
     }
