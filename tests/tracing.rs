@@ -1,11 +1,15 @@
 //! The hierarchy against testing every simplex; closed surfaces against leaks; pictures against projections.
 
+use std::sync::Arc;
+
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64};
 use ao4d::mesh::{Mesh, Surface};
-use ao4d::occlusion::{Estimates, Sampler, Settings};
+use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
 use ao4d::render::{Aov, Camera, Projection, Renderer, Shading, Slab, View};
+use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
+use ao4d::trace::{NOTHING, RayBackend, Sampling};
 use ao4d::volume::Values;
 
 mod support;
@@ -37,7 +41,7 @@ fn same_hits<const D: usize>() {
     let mut random = Random(7);
     for (count, coarse) in [(1, false), (40, false), (60, true), (150, false), (150, true)] {
         let mesh = soup::<D>(&mut random, count, coarse);
-        let tracer = Tracer::new(&mesh);
+        let tracer = Tracer::new(mesh.clone());
         let mut hits = 0;
         for _ in 0..300 {
             let origin = random.point::<D>(coarse).map(|x| x as f32);
@@ -95,10 +99,67 @@ fn cube<const D: usize>(low: f64, high: f64) -> Surface<D> {
     Surface { vertices, simplices, normals: None }
 }
 
+/// Layer after layer behind each other, as testing every simplex finds them; by both engines of the processor.
+fn peeled<const D: usize>() {
+    let mut random = Random(12);
+    for (count, coarse) in [(40, false), (60, true), (150, true)] {
+        let mut surface = random.soup::<D>(count, 0.7, coarse);
+        // Some simplices twice, which are hit at exactly the same distance.
+        surface.simplices.extend_from_within(..count / 4);
+        let mesh = mesh(&surface);
+        let tracer = Arc::new(Tracer::new(mesh.clone()));
+        let rays: Vec<Ray<D>> = (0..200)
+            .map(|_| [random.point::<D>(coarse), random.point::<D>(coarse)].map(|p| p.map(|x| x as f32)))
+            .filter(|[_, direction]| direction.amax() > 0.0)
+            .map(|[origin, direction]| Ray::new(origin * 2.0, direction))
+            .collect();
+        let hit = |ray: &Ray<D>, s: u32| {
+            let cone = Cone::of_simplex(&ray.origin, &mesh.corners(s));
+            let counts = !mesh.degenerate.contains(&s) && cone.contains(&ray.direction);
+            counts.then(|| cone.exact_distance(&ray.direction))
+        };
+        let nearer = |a: &(Expansion, Expansion), b: &(Expansion, Expansion)| {
+            a.0.multiply(&b.1).add(&b.0.multiply(&a.1).negate()).sign() < 0
+        };
+        let backends: [&dyn RayBackend<D>; 2] = [&CpuBackend::new(tracer.clone()), &ScalarBackend::new(tracer.clone())];
+        let mut after = vec![NOTHING; rays.len()];
+        let mut behind = 0;
+        for layer in 0..6 {
+            let expected: Vec<u32> = (rays.iter().zip(&after))
+                .map(|(ray, &after)| {
+                    let bound = if after == NOTHING { None } else { hit(ray, after) };
+                    let mut best: Option<(u32, (Expansion, Expansion))> = None;
+                    for s in 0..mesh.simplices.len() as u32 {
+                        let Some(t) = hit(ray, s) else { continue };
+                        let allowed = bound.as_ref().is_none_or(|bound| nearer(bound, &t));
+                        if allowed && best.as_ref().is_none_or(|(_, least)| nearer(&t, least)) {
+                            best = Some((s, t));
+                        }
+                    }
+                    best.map_or(NOTHING, |(s, _)| s)
+                })
+                .collect();
+            for backend in backends {
+                assert_eq!(backend.first_hits(&rays, Some(&after), &Silent).unwrap(), expected, "{D}D, layer {layer}");
+            }
+            behind += usize::from(layer > 0) * expected.iter().filter(|&&s| s != NOTHING).count();
+            // Where nothing is left, another simplex that is not hit bounds nothing.
+            after = expected;
+        }
+        assert!(behind > 100, "{behind} hits behind others");
+    }
+}
+
+#[test]
+fn layers_are_peeled_exactly() {
+    peeled::<3>();
+    peeled::<4>();
+}
+
 fn no_leaks<const D: usize>() {
     let mesh = mesh(&cube::<D>(-0.3, 0.7));
     assert!(mesh.objects[0].is_closed());
-    let tracer = Tracer::new(&mesh);
+    let tracer = Tracer::new(mesh.clone());
     let mut random = Random(99);
     for k in 0..20_000u32 {
         let origin = random.point::<D>(false).map(|x| (x * 0.25 + 0.2) as f32);
@@ -143,10 +204,10 @@ fn axes<const D: usize>(projection: Projection) {
         .collect();
     let simplices = vec![std::array::from_fn(|i| i as u32)];
     let mesh = mesh(&Surface { vertices, simplices, normals: None });
-    let tracer = Tracer::new(&mesh);
+    let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(mesh.clone())));
     let camera = Camera::new(&View { projection, ..View::default() }).unwrap();
     let dimensions = [40, 20, if D == 4 { 30 } else { 1 }];
-    let renderer = Renderer::new(&tracer, camera.clone(), dimensions, Shading::None);
+    let renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, Shading::None);
     let grid = renderer.grid;
     let aovs = [Aov::Opacity, Aov::Depth, Aov::Object, Aov::Rgba, Aov::Normal];
     let arrays = renderer.volume(&aovs, &Silent).unwrap().arrays;
@@ -191,17 +252,17 @@ fn pictures_show_things_where_they_project_to() {
 fn slabs<const D: usize>() {
     let mut random = Random(3);
     let mesh = soup::<D>(&mut random, 30, false);
-    let tracer = Tracer::new(&mesh);
+    let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(mesh.clone())));
     let view = View { eye: View::<D>::default().eye * 3.0, ..View::default() };
     let camera = Camera::new(&view).unwrap();
     let dimensions = [9, 7, if D == 4 { 8 } else { 1 }];
     let count = mesh.vertices.len();
     let estimates =
         Estimates { values: (0..count).map(|i| (i % 10) as f32 / 10.0).collect(), errors: vec![0.01; count], rays: 0 };
-    let sobol = Settings { sampler: Sampler::Sobol, samples: 16, seed: 1, max_distance: f32::INFINITY };
-    for shading in [Shading::Flat(&estimates), Shading::Smooth(&estimates), Shading::Voxel(sobol.into())] {
+    let sobol = Estimator::Sampled(Sampling::new(16, 1));
+    for shading in [Shading::Flat(&estimates), Shading::Smooth(&estimates), Shading::Voxel(sobol)] {
         for supersample in [1, 2, 3] {
-            let mut renderer = Renderer::new(&tracer, camera.clone(), dimensions, shading);
+            let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading);
             renderer.supersample = supersample;
             let whole = renderer.volume(Aov::ALL, &Silent).unwrap().arrays;
             for (thickness, threads) in [(1, 1), (2, 3), (7, 2), (100, 1)] {
@@ -233,7 +294,7 @@ fn means<const D: usize>(supersample: usize) {
     (mesh.objects[0].simplices, front.simplices) = (0..half, half..mesh.simplices.len());
     (mesh.objects[0].color, front.color) = ([1.0, 0.5, 0.0], [0.25, 0.75, 1.0]);
     mesh.objects.push(front);
-    let tracer = Tracer::new(&mesh);
+    let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(mesh.clone())));
     // In parallel projection what is interpolated is linear in the image.
     let projection = Projection::Parallel { height: 2.0 };
     let view = View { eye: View::<D>::default().eye * 3.0, projection, ..View::default() };
@@ -243,8 +304,8 @@ fn means<const D: usize>(supersample: usize) {
     let values = (0..count).map(|i| (i % 10) as f32 / 10.0).collect();
     let estimates = Estimates { values, errors: vec![0.0; count], rays: 0 };
     let fine_dimensions: [usize; 3] = std::array::from_fn(|a| dimensions[a] * if a < D - 1 { supersample } else { 1 });
-    let fine = Renderer::new(&tracer, camera.clone(), fine_dimensions, Shading::Smooth(&estimates));
-    let mut coarse = Renderer::new(&tracer, camera, dimensions, Shading::Smooth(&estimates));
+    let fine = Renderer::new(Arc::clone(&backend), camera.clone(), fine_dimensions, Shading::Smooth(&estimates));
+    let mut coarse = Renderer::new(Arc::clone(&backend), camera, dimensions, Shading::Smooth(&estimates));
     coarse.supersample = supersample;
     let aovs = [Aov::Opacity, Aov::AmbientOcclusion, Aov::Rgb];
     let [fine_arrays, coarse_arrays] = [&fine, &coarse].map(|r| r.volume(&aovs, &Silent).unwrap().arrays);

@@ -248,8 +248,8 @@ pub(super) fn write_mesh<const D: usize>(
 
 /// Why a picture shows nothing.
 pub(super) fn nothing_seen<const D: usize>(picture: &Renderer<D>, id: &str) -> String {
-    let behind = |v: &u32| picture.camera.project(&picture.tracer.mesh().vertices[*v as usize]).1 <= 0.0;
-    let why = if picture.tracer.mesh().simplices.iter().flatten().all(behind) {
+    let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
+    let why = if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
         "the scene lies wholly behind the camera; turn the camera, or move it back"
     } else {
         "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::gbuffer::{Columns, GBuffer};
 use super::{NOTHING, Renderer};
-use crate::occlusion::opencl::Point;
-use crate::occlusion::{Error, Estimate, Method};
+use crate::occlusion::{Error, Estimator};
 use crate::progress::Progress;
+use crate::trace::ShadingPoint;
 
 /// What a visible point is made of.
 pub(super) const COLUMNS: Columns = Columns::SIMPLEX.union(Columns::POSITION).union(Columns::NORMAL);
@@ -14,49 +14,34 @@ pub(super) const COLUMNS: Columns = Columns::SIMPLEX.union(Columns::POSITION).un
 /// Sets occlusion and its error where a voxel of the buffer shows a point.
 ///
 /// # Errors
-/// Those of the method.
+/// Those of the estimator.
 pub(super) fn occlude<const D: usize>(
     renderer: &Renderer<D>,
-    method: Method,
+    estimator: Estimator,
     buffer: &mut GBuffer<D>,
     progress: &dyn Progress,
 ) -> Result<(), Error> {
     let seen: Vec<usize> = (0..buffer.len()).filter(|&i| buffer.simplex[i] != NOTHING).collect();
     let first = buffer.layers().start * buffer.layer_len();
-    let point = |&i: &usize| Point::Inside {
+    let point = |&i: &usize| ShadingPoint::Inside {
         position: buffer.position[i],
         normal: buffer.normal[i],
         simplex: buffer.simplex[i],
         number: (first + i) as u64,
     };
-    let points: Vec<Point<D>> = seen.par_iter().map(point).collect();
-    let found: Vec<Estimate> = match renderer.device.filter(|_| method.is_traced()) {
-        Some(device) => method.at_points_on(device, &points, progress)?,
-        None => {
-            let [width, height, _] = buffer.dimensions();
-            let tracer = renderer.tracer;
-            tracer.prepare();
-            (points.par_iter())
-                .map(|point| {
-                    if progress.cancelled() {
-                        return Err(Error::Cancelled);
-                    }
-                    let Point::Inside { position, normal, simplex, number } = point else {
-                        return Ok(Estimate::known(1.0));
-                    };
-                    let n = *number as usize;
-                    let place = || format!("voxel ({}, {}, {})", n % width, n / width % height, n / width / height);
-                    method.at_point(tracer, position, normal, *simplex, *number, place)
-                })
-                .collect::<Result<_, _>>()?
-        }
+    let points: Vec<ShadingPoint<D>> = seen.par_iter().map(point).collect();
+    let [width, height, _] = buffer.dimensions();
+    let voxel = |place: usize| {
+        let n = first + seen[place];
+        format!("voxel ({}, {}, {})", n % width, n / width % height, n / width / height)
     };
-    for (&i, estimate) in seen.iter().zip(found) {
+    let found = estimator.estimate(&*renderer.backend, &points, None, progress).map_err(|error| error.placed(voxel))?;
+    for ((&i, value), found_error) in seen.iter().zip(found.values).zip(found.errors) {
         if let Some(occlusion) = buffer.occlusion.get_mut(i) {
-            *occlusion = estimate.value.clamp(0.0, 1.0);
+            *occlusion = value.clamp(0.0, 1.0);
         }
         if let Some(error) = buffer.error.get_mut(i) {
-            *error = estimate.error;
+            *error = found_error;
         }
     }
     Ok(())

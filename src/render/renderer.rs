@@ -1,6 +1,7 @@
 //! The renderer: all that decides what a picture shows, and the picture slab by slab.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
@@ -8,8 +9,9 @@ use super::samples::Sampling;
 use super::surface::SurfacePass;
 use super::{Aov, Camera, NOTHING, Shading, Visibility, occlude, visibility};
 use crate::accel::Tracer;
-use crate::occlusion::{Error, opencl};
+use crate::occlusion::Error;
 use crate::progress::Progress;
+use crate::trace::RayBackend;
 use crate::volume::{Array, Grid, Volume};
 
 /// The working set of a slab: so little that memory is used again for the next, not asked for anew.
@@ -18,16 +20,14 @@ const SLAB_BYTES: usize = 16 << 20;
 /// Everything that decides what a picture shows.
 #[derive(Debug)]
 pub struct Renderer<'s, const D: usize> {
-    /// The scene.
-    pub tracer: &'s Tracer<'s, D>,
+    /// What traces rays through the scene.
+    pub backend: Arc<dyn RayBackend<D>>,
     /// Who looks.
     pub camera: Camera<D>,
     /// The voxels.
     pub grid: Grid,
     /// Where their ambient occlusion comes from.
     pub shading: Shading<'s>,
-    /// The device that traces rays, if not the processor.
-    pub device: Option<&'s opencl::Scene<'s, D>>,
     /// How it is found out what voxels see; changes the time only.
     pub visibility: visibility::Method,
     /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
@@ -48,18 +48,28 @@ pub struct Slab {
 }
 
 impl<'s, const D: usize> Renderer<'s, D> {
-    /// A picture with one sample a voxel and no filter, on the processor.
-    pub fn new(tracer: &'s Tracer<'s, D>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading<'s>) -> Self {
+    /// A picture with one sample a voxel and no filter.
+    pub fn new(
+        backend: Arc<dyn RayBackend<D>>,
+        camera: Camera<D>,
+        dimensions: [usize; 3],
+        shading: Shading<'s>,
+    ) -> Self {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
-        Self { tracer, camera, grid, shading, device: None, visibility, supersample: 1, filters: Vec::new() }
+        Self { backend, camera, grid, shading, visibility, supersample: 1, filters: Vec::new() }
+    }
+
+    /// The scene.
+    pub fn tracer(&self) -> &Tracer<D> {
+        self.backend.tracer()
     }
 
     /// Makes the picture from the first layer to the last, and hands over slab after slab with these arrays. `thickness`
     /// is how many layers a slab has; by default as many as need little memory. No value depends on it.
     ///
     /// # Errors
-    /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where a closed form is too dear, and those of
+    /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where a closed form is too expensive, and those of
     /// `sink`.
     pub fn render<E: From<Error>>(
         &self,
@@ -71,10 +81,10 @@ impl<'s, const D: usize> Renderer<'s, D> {
         let depth = self.grid.dimensions[2];
         let thickness = thickness.unwrap_or_else(|| self.layers_within(SLAB_BYTES, aovs)).max(1);
         let sampling = Sampling::new(&self.camera, &self.grid, self.supersample);
-        let visibility = Visibility::new(self.tracer, &self.camera, &sampling.fine, self.visibility).on(self.device);
+        let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
         let columns = self.columns(aovs);
         let pass = SurfacePass {
-            tracer: self.tracer,
+            tracer: self.tracer(),
             camera: &self.camera,
             sampling: &sampling,
             visibility: &visibility,

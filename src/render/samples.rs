@@ -79,7 +79,7 @@ impl Sampling {
         progress: &dyn Progress,
     ) -> Result<Vec<u32>, Error> {
         let z = self.per_axis[2];
-        visibility.first_hits(layers.start * z..layers.end * z, progress)
+        Ok(visibility.first_hits(layers.start * z..layers.end * z, progress)?)
     }
 
     /// What the samples of voxel (i, j) of the `layer`-th layer see, of what [`Sampling::first_hits`] found: the groups

@@ -1,6 +1,6 @@
 //! Where the ambient occlusion of a visible point comes from.
 
-use crate::occlusion::{Estimates, Method};
+use crate::occlusion::{Estimates, Estimator};
 
 /// Where the ambient occlusion of a visible point comes from.
 #[derive(Clone, Copy, Debug)]
@@ -12,5 +12,5 @@ pub enum Shading<'s> {
     /// Interpolated between the simplex's vertices' values, by barycentric coordinates.
     Smooth(&'s Estimates),
     /// Computed at the point itself, on the side that faces the ray: the reference for the other two.
-    Voxel(Method),
+    Voxel(Estimator),
 }

@@ -21,10 +21,10 @@ use crate::progress::Progress;
 
 /// What turns hits into columns.
 pub(super) struct SurfacePass<'r, const D: usize> {
-    pub tracer: &'r Tracer<'r, D>,
+    pub tracer: &'r Tracer<D>,
     pub camera: &'r Camera<D>,
     pub sampling: &'r Sampling,
-    pub visibility: &'r Visibility<'r, D>,
+    pub visibility: &'r Visibility<D>,
     pub shading: &'r Shading<'r>,
 }
 

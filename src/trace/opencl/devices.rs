@@ -6,8 +6,7 @@ use opencl3::device::{CL_DEVICE_TYPE_ALL, CL_DEVICE_TYPE_CPU, CL_DEVICE_TYPE_GPU
 use opencl3::platform::{Platform, get_platforms};
 use opencl3::types::cl_device_id;
 
-use super::Error;
-use super::error::explain;
+use super::error::{Error, explain};
 
 /// CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT.
 const ROUNDED: u64 = 1 << 7;

@@ -9,48 +9,21 @@
 //! - [`devices()`]: what there is;
 //! - `device`: an open device, the only file that calls OpenCL;
 //! - `layout`, `program`: the structs and the text of the kernels (`kernels/*.cl`);
-//! - [`Scene`]: a mesh with its hierarchy on a device;
+//! - [`OpenClBackend`]: a mesh with its hierarchy on devices;
 //! - `points`: shading points, in batches short enough for watchdogs and for whoever wants to stop.
 //!
 //! libOpenCL is opened at run time; nothing of it is needed to build, or to run without it.
 
+mod backend;
 mod device;
 mod devices;
 mod error;
 mod layout;
+mod open;
 mod points;
 mod program;
-mod scene;
 
+pub use backend::OpenClBackend;
 pub use devices::{Info, Kind, devices, preferred};
 pub use error::Error;
-pub use points::Point;
-pub use scene::Scene;
-
-use device::Device;
-
-/// Open devices, that share the work.
-#[derive(Debug)]
-pub struct OpenCl {
-    devices: Vec<Device>,
-}
-
-impl OpenCl {
-    /// Opens the devices of these platforms and numbers, or if none is named the one that [`preferred`] names.
-    ///
-    /// # Errors
-    /// [`Error::Missing`] if there is no OpenCL, [`Error::NoDevice`] if not such a device.
-    pub fn open(places: &[(usize, usize)]) -> Result<Self, Error> {
-        let open = |place| Device::open(devices::choose(place)?);
-        let devices = match places {
-            [] => vec![open(None)?],
-            places => places.iter().map(|&place| open(Some(place))).collect::<Result<_, _>>()?,
-        };
-        Ok(Self { devices })
-    }
-
-    /// What they are.
-    pub fn devices(&self) -> impl Iterator<Item = &Info> {
-        self.devices.iter().map(|device| &device.info)
-    }
-}
+pub use open::OpenCl;

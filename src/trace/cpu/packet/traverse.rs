@@ -14,7 +14,7 @@ use super::cones::Cones;
 use super::directions::{BLOCK, GROUPS, Rays};
 use super::lanes::Lanes;
 use super::leaves::{HEIGHT_ROUNDING, hits_of_one, hits_of_set};
-use super::question::Question;
+use super::query::Query;
 use crate::accel::{TAG_BITS, WIDTH, WideNode};
 
 /// Fewer rays than this go their own ways.
@@ -46,28 +46,28 @@ impl<const D: usize> Traversal<D> {
 
     /// Which of the rays `alive` hit something.
     #[inline(always)]
-    pub fn blocked<L: Lanes>(&mut self, question: &Question<D>, rays: &Rays<D>, alive: u64) -> u64 {
-        if question.wide.nodes.is_empty() {
+    pub fn blocked<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, alive: u64) -> u64 {
+        if query.wide.nodes.is_empty() {
             return 0;
         }
         // Each node leaves at most all but one of its children behind, and a push writes eight words.
-        self.room = PARTED + (WIDTH - 1) * question.wide.depth + 2 * WIDTH;
+        self.room = PARTED + (WIDTH - 1) * query.wide.depth + 2 * WIDTH;
         if self.stacks.len() < BLOCK * self.room {
             self.stacks.resize(BLOCK * self.room, 0);
         }
         for i in 0..BLOCK {
             self.ends[i] = (i * self.room) as u32;
         }
-        let limit = L::splat(question.box_limit());
+        let limit = L::splat(query.box_limit());
         let mut open = alive;
-        self.together::<L>(question, rays, limit, &mut open);
-        self.singly::<L>(question, rays, limit, &mut open);
+        self.together::<L>(query, rays, limit, &mut open);
+        self.singly::<L>(query, rays, limit, &mut open);
         alive & !open
     }
 
     /// Sets of rays, as long as they are large.
     #[inline(always)]
-    fn together<L: Lanes>(&mut self, question: &Question<D>, rays: &Rays<D>, limit: L, open: &mut u64) {
+    fn together<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, limit: L, open: &mut u64) {
         self.sets.clear();
         self.pairs.clear();
         self.sets.push((*open, 0));
@@ -79,8 +79,8 @@ impl<const D: usize> Traversal<D> {
                     continue;
                 }
             }
-            let node = &question.wide.nodes[(index >> TAG_BITS) as usize];
-            let (tests, count) = possible::<L, D>(question, rays, node, set);
+            let node = &query.wide.nodes[(index >> TAG_BITS) as usize];
+            let (tests, count) = possible::<L, D>(query, rays, node, set);
             let mut met = [0u64; WIDTH];
             for &test in &tests[..count] {
                 let (child, group) = (test as usize % WIDTH, test as usize / WIDTH % GROUPS);
@@ -105,16 +105,16 @@ impl<const D: usize> Traversal<D> {
                 let index = node.children[child];
                 if node.leaves >> child & 1 == 0 {
                     self.sets.push((set, index));
-                    L::fetch(&question.wide.nodes, index >> TAG_BITS);
+                    L::fetch(&query.wide.nodes, index >> TAG_BITS);
                 } else if set.count_ones() < FEW {
-                    L::fetch(&question.wide.leaves, index >> TAG_BITS);
+                    L::fetch(&query.wide.leaves, index >> TAG_BITS);
                     let mut rest = set;
                     while rest != 0 {
                         self.pairs.push(index | rest.trailing_zeros());
                         rest &= rest - 1;
                     }
                 } else {
-                    *open &= !hits_of_set::<L, D>(question, rays, index >> TAG_BITS, set, &mut self.cones);
+                    *open &= !hits_of_set::<L, D>(query, rays, index >> TAG_BITS, set, &mut self.cones);
                 }
             }
         }
@@ -141,7 +141,7 @@ impl<const D: usize> Traversal<D> {
 
     /// Every ray with nodes left on its stack by itself.
     #[inline(always)]
-    fn singly<L: Lanes>(&mut self, question: &Question<D>, rays: &Rays<D>, limit: L, open: &mut u64) {
+    fn singly<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, limit: L, open: &mut u64) {
         let mut going = [0u8; BLOCK];
         let mut count = 0;
         for i in 0..BLOCK {
@@ -155,7 +155,7 @@ impl<const D: usize> Traversal<D> {
         loop {
             for &pair in &self.pairs[..waiting] {
                 let i = pair as usize % BLOCK;
-                if *open >> i & 1 == 1 && hits_of_one::<L, D>(question, rays, pair >> TAG_BITS, i) {
+                if *open >> i & 1 == 1 && hits_of_one::<L, D>(query, rays, pair >> TAG_BITS, i) {
                     *open &= !(1 << i);
                 }
             }
@@ -171,7 +171,7 @@ impl<const D: usize> Traversal<D> {
                     continue;
                 }
                 let end = self.ends[i] as usize - 1;
-                let node = &question.wide.nodes[(self.stacks[end] >> TAG_BITS) as usize];
+                let node = &query.wide.nodes[(self.stacks[end] >> TAG_BITS) as usize];
                 let (mut enter, mut exit) = (L::splat(0.0), limit);
                 for k in 0..D {
                     let [middle, half] = &node.boxes[k];
@@ -188,10 +188,10 @@ impl<const D: usize> Traversal<D> {
                 going[count] = ray;
                 count += usize::from(end > i * self.room);
                 // The node for the next round; if there is none, any.
-                L::fetch(&question.wide.nodes, self.stacks[end.saturating_sub(1)] >> TAG_BITS);
+                L::fetch(&query.wide.nodes, self.stacks[end.saturating_sub(1)] >> TAG_BITS);
             }
             for &pair in &self.pairs[..waiting] {
-                L::fetch(&question.wide.leaves, pair >> TAG_BITS);
+                L::fetch(&query.wide.leaves, pair >> TAG_BITS);
             }
         }
     }
@@ -200,7 +200,7 @@ impl<const D: usize> Traversal<D> {
 /// The boxes of a node that groups of rays of the set may meet, each as group * 8 + child, and how many.
 #[inline(always)]
 fn possible<L: Lanes, const D: usize>(
-    question: &Question<D>,
+    query: &Query<D>,
     rays: &Rays<D>,
     node: &WideNode<D>,
     set: u64,
@@ -212,11 +212,11 @@ fn possible<L: Lanes, const D: usize>(
     let mut away = [zero; D];
     for k in 0..D {
         let [middle, half] = &node.boxes[k];
-        let (middle, half) = (L::load(middle).sub(L::splat(question.centred[k])), L::load(half));
+        let (middle, half) = (L::load(middle).sub(L::splat(query.centred[k])), L::load(half));
         distance = middle.mul_add(middle, distance);
         radius = half.mul_add(half, radius);
-        height = middle.mul_add(L::splat(question.normal[k]), height);
-        height = half.mul_add(L::splat(question.normal[k].abs()), height);
+        height = middle.mul_add(L::splat(query.normal[k]), height);
+        height = half.mul_add(L::splat(query.normal[k].abs()), height);
         away[k] = middle;
     }
     let above = node.used & L::splat(-HEIGHT_ROUNDING).less_or_equal(height);

@@ -1,18 +1,23 @@
-//! A mesh on a device.
+//! A mesh on devices, and first hits there.
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use super::device::{Argument, Device, Kernels, Memory};
+use super::devices::Kind;
+use super::error::Error;
 use super::layout::{self, Float4};
-use super::{Error, Kind, OpenCl};
+use super::open::OpenCl;
 use crate::accel::{Scale, Tracer};
-use crate::geometry::{Ray, Vector};
-use crate::occlusion::sampling::sobol_matrices;
-use crate::occlusion::{Cancelled, Error as OcclusionError, Sampler, Sequence};
-use crate::progress::Progress;
+use crate::geometry::{Cone, Frame, Ray, Vector};
+use crate::progress::{Cancelled, Progress};
+use crate::trace::backend::{Error as TraceError, NOTHING, RayBackend};
+use crate::trace::cpu::{CpuBackend, first_hit};
+use crate::trace::estimate::Estimate;
+use crate::trace::point::ShadingPoint;
+use crate::trace::sampling::{Sampler, Sampling, Sequence, Source, sobol_matrices};
 
 /// What boxes grow by on each side, in widths of the scene, beside the rounding of that: far more than what
 /// `inverted` of the kernels moves a ray by, and so little that it only matters around 0.
@@ -24,11 +29,11 @@ pub(super) const MOST_RAYS: usize = 1 << 21;
 /// Seconds that a launch may take: long enough to be worth it, short enough for watchdogs.
 const LAUNCH: f64 = 0.06;
 
-/// A mesh with its hierarchy on one device or several.
+/// A mesh with its hierarchy on one device or several. It owns what it needs, and can be kept in anything.
 #[derive(Debug)]
-pub struct Scene<'s, const D: usize> {
-    pub(super) parts: Vec<Part<'s>>,
-    pub(super) tracer: &'s Tracer<'s, D>,
+pub struct OpenClBackend<const D: usize> {
+    pub(super) parts: Vec<Part>,
+    pub(super) tracer: Arc<Tracer<D>>,
     pub(super) scale: Scale<D>,
     /// Whether scaled coordinates lose nothing. If they do, the device isn't asked.
     pub(super) serves: bool,
@@ -38,8 +43,8 @@ pub struct Scene<'s, const D: usize> {
 
 /// A device with the mesh on it.
 #[derive(Debug)]
-pub(super) struct Part<'s> {
-    pub device: &'s Device,
+pub(super) struct Part {
+    pub device: Arc<Device>,
     /// Whether the device makes directions like the host.
     pub makes_directions: bool,
     pub on_device: Mutex<OnDevice>,
@@ -73,12 +78,13 @@ pub(super) fn float4<const D: usize>(v: &Vector<D>) -> Float4 {
     Float4(all)
 }
 
-impl<'s, const D: usize> Scene<'s, D> {
+impl<const D: usize> OpenClBackend<D> {
     /// Brings the mesh and its hierarchy to the devices, and compiles the kernels for them.
     ///
     /// # Errors
     /// [`Error`] if the device has not enough memory or the kernels don't compile.
-    pub fn new(opencl: &'s OpenCl, tracer: &'s Tracer<'s, D>) -> Result<Self, Error> {
+    pub fn new(opencl: &OpenCl, tracer: impl Into<Arc<Tracer<D>>>) -> Result<Self, Error> {
+        let tracer = tracer.into();
         tracer.prepare();
         let (mesh, bvh) = (tracer.mesh(), tracer.bvh());
         let scale = Scale::of(&mesh.vertices);
@@ -93,32 +99,22 @@ impl<'s, const D: usize> Scene<'s, D> {
             .collect();
         let corners: Vec<Float4> =
             (bvh.order.par_iter()).flat_map_iter(|&s| mesh.corners(s).map(|v| float4(&scale.scaled(&v)))).collect();
-        let part = |device| {
-            let kernels = Device::build(device, D, bvh.depth())?;
-            let matrices = device.filled(&sobol_matrices(), "tables")?;
+        let part = |device: &Arc<Device>| {
+            let kernels = device.build(D, bvh.depth())?;
+            let matrices = device.input(&sobol_matrices(), "tables")?;
             let makes_directions = makes_directions::<D>(device, &kernels, &matrices)?;
             let on_device = OnDevice {
                 kernels,
-                nodes: device.filled(&nodes, "the nodes of the hierarchy")?,
-                corners: device.filled(&corners, "the corners of the simplices")?,
-                simplices: device.filled(&bvh.order, "the simplices")?,
+                nodes: device.input(&nodes, "the nodes of the hierarchy")?,
+                corners: device.input(&corners, "the corners of the simplices")?,
+                simplices: device.input(&bvh.order, "the simplices")?,
                 matrices,
                 rays: RAYS,
             };
-            Ok(Part { device, makes_directions, on_device: Mutex::new(on_device) })
+            Ok(Part { device: Arc::clone(device), makes_directions, on_device: Mutex::new(on_device) })
         };
         let parts = opencl.devices.iter().map(part).collect::<Result<_, Error>>()?;
         Ok(Self { parts, tracer, scale, serves, settled: AtomicU64::new(0) })
-    }
-
-    /// The mesh and its hierarchy.
-    pub fn tracer(&self) -> &'s Tracer<'s, D> {
-        self.tracer
-    }
-
-    /// Whether no device is the processor itself.
-    pub fn is_apart(&self) -> bool {
-        self.parts.iter().all(|part| part.device.info.kind != Kind::Cpu)
     }
 
     /// Whether the rays of the samplers are made on the devices; else they are made here and handed over.
@@ -130,17 +126,17 @@ impl<'s, const D: usize> Scene<'s, D> {
     pub(super) fn share<R: Send>(
         &self,
         count: usize,
-        job: impl Fn(&Part, usize) -> Result<R, OcclusionError> + Sync,
-    ) -> Result<Vec<R>, OcclusionError> {
+        job: impl Fn(&Part, usize) -> Result<R, TraceError> + Sync,
+    ) -> Result<Vec<R>, TraceError> {
         if let [part] = &self.parts[..] {
             return (0..count).map(|i| job(part, i)).collect();
         }
         let next = AtomicUsize::new(0);
         let of_part = |part| {
             let taken = || Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&i| i < count);
-            std::iter::from_fn(taken).map(|i| Ok((i, job(part, i)?))).collect::<Result<Vec<_>, OcclusionError>>()
+            std::iter::from_fn(taken).map(|i| Ok((i, job(part, i)?))).collect::<Result<Vec<_>, TraceError>>()
         };
-        let found: Vec<Result<Vec<(usize, R)>, OcclusionError>> = std::thread::scope(|scope| {
+        let found: Vec<Result<Vec<(usize, R)>, TraceError>> = std::thread::scope(|scope| {
             let threads: Vec<_> = self.parts.iter().map(|part| scope.spawn(|| of_part(part))).collect();
             let join = |thread: std::thread::ScopedJoinHandle<'_, _>| match thread.join() {
                 Ok(found) => found,
@@ -166,43 +162,38 @@ impl<'s, const D: usize> Scene<'s, D> {
         self.tracer.bvh().nodes.is_empty()
     }
 
-    /// The simplex that each ray hits first, as [`Tracer::closest_hit`] tells; `u32::MAX` if there is none.
-    ///
-    /// # Errors
-    /// [`OcclusionError::Cancelled`] if `progress` says so, [`OcclusionError::OpenCl`] if a call fails.
-    pub fn first_hits(&self, rays: &[Ray<D>], progress: &dyn Progress) -> Result<Vec<u32>, OcclusionError> {
-        let host = |ray: &Ray<D>| self.tracer.closest_hit(ray).map_or(layout::NONE, |hit| hit.simplex);
-        if !self.serves {
-            return Ok(rays.par_iter().map(host).collect());
-        }
-        let count = self.parts.len();
-        let size = if count == 1 { rays.len().max(1) } else { rays.len().div_ceil(4 * count).max(1) };
-        let jobs: Vec<&[Ray<D>]> = rays.chunks(size).collect();
-        Ok(self.share(jobs.len(), |part, i| self.first_hits_on(part, jobs[i], &host, progress))?.concat())
-    }
-
+    /// First hits of some rays by one device.
     fn first_hits_on(
         &self,
         on: &Part,
         rays: &[Ray<D>],
-        host: &(impl Fn(&Ray<D>) -> u32 + Sync),
+        after: Option<&[u32]>,
         progress: &dyn Progress,
-    ) -> Result<Vec<u32>, OcclusionError> {
-        let mut found = vec![layout::NONE; rays.len()];
+    ) -> Result<Vec<u32>, TraceError> {
+        let mut found = vec![NOTHING; rays.len()];
         let mut on_device = on.on_device.lock().unwrap_or_else(PoisonError::into_inner);
         let mut begin = 0;
         while begin < rays.len() {
             if progress.cancelled() {
                 return Err(Cancelled.into());
             }
-            let part = &rays[begin..rays.len().min(begin + on_device.rays)];
-            let found = &mut found[begin..begin + part.len()];
+            let range = begin..rays.len().min(begin + on_device.rays);
+            let part = &rays[range.clone()];
+            let after = after.map(|after| &after[range.clone()]);
+            let found = &mut found[range];
             let start = std::time::Instant::now();
             let origins: Vec<Float4> = part.par_iter().map(|r| float4(&self.scale.scaled(&r.origin))).collect();
-            let ways: Vec<Float4> = part.par_iter().map(|r| float4(&r.direction)).collect();
-            let origins = on.device.filled(&origins, "rays")?;
-            let ways = on.device.filled(&ways, "rays")?;
-            let out = on.device.empty::<u32>(part.len(), "results")?;
+            let directions: Vec<Float4> = part.par_iter().map(|r| float4(&r.direction)).collect();
+            let bounds: Vec<(u32, [f32; 2])> = match after {
+                Some(after) => part.par_iter().zip(after).map(|(ray, &after)| self.bound(ray, after)).collect(),
+                None => Vec::new(),
+            };
+            let (passed, bounds): (Vec<u32>, Vec<[f32; 2]>) = bounds.into_iter().unzip();
+            let origins = on.device.input(&origins, "rays")?;
+            let directions = on.device.input(&directions, "rays")?;
+            let passed = on.device.input(&passed, "simplices that rays have passed")?;
+            let bounds = on.device.input(&bounds, "distances that rays have passed")?;
+            let out = on.device.output::<u32>(part.len(), "results")?;
             let state = &*on_device;
             let arguments = [
                 state.nodes.argument(),
@@ -210,22 +201,83 @@ impl<'s, const D: usize> Scene<'s, D> {
                 state.simplices.argument(),
                 Argument::U32(u32::from(self.is_empty())),
                 origins.argument(),
-                ways.argument(),
+                directions.argument(),
+                Argument::U32(u32::from(after.is_some())),
+                passed.argument(),
+                bounds.argument(),
                 Argument::U64(part.len() as u64),
                 out.argument(),
             ];
             on.device.launch(&state.kernels.first_hit, &arguments, part.len())?;
             on.device.read(&out, found)?;
             on_device.learn(part.len(), start.elapsed().as_secs_f64());
-            found.par_iter_mut().zip(part).for_each(|(found, ray)| {
+            found.par_iter_mut().zip(part).enumerate().for_each(|(i, (found, ray))| {
                 if *found == layout::UNSURE_SIMPLEX || !is_exact(&self.scale, &ray.origin) {
-                    *found = host(ray);
+                    *found = first_hit(&self.tracer, ray, after.map_or(NOTHING, |after| after[i]));
                     self.settled.fetch_add(1, Ordering::Relaxed);
                 }
             });
             begin += part.len();
         }
         Ok(found)
+    }
+
+    /// The simplex that bounds a ray, if it does, and two distances between which the ray surely hits it, as the device
+    /// measures them.
+    fn bound(&self, ray: &Ray<D>, after: u32) -> (u32, [f32; 2]) {
+        let unbounded = (NOTHING, [0.0; 2]);
+        let mesh = self.tracer.mesh();
+        if after as usize >= mesh.simplices.len() {
+            return unbounded;
+        }
+        let cone = Cone::of_simplex(&ray.origin, &mesh.corners(after));
+        if !cone.contains(&ray.direction) {
+            return unbounded;
+        }
+        let crossing = cone.crossing(&ray.direction);
+        let scaled = |t: f64| (t * self.scale.factor) as f32;
+        let low = scaled((crossing.t - crossing.error) * (1.0 - 1e-6)).next_down();
+        let high = scaled((crossing.t + crossing.error) * (1.0 + 1e-6)).next_up();
+        (after, [low, high])
+    }
+}
+
+impl<const D: usize> RayBackend<D> for OpenClBackend<D> {
+    fn tracer(&self) -> &Arc<Tracer<D>> {
+        &self.tracer
+    }
+
+    fn first_hits(
+        &self,
+        rays: &[Ray<D>],
+        after: Option<&[u32]>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<u32>, TraceError> {
+        assert!(after.is_none_or(|after| after.len() == rays.len()), "one bound a ray");
+        if !self.serves {
+            return CpuBackend::new(Arc::clone(&self.tracer)).first_hits(rays, after, progress);
+        }
+        let count = self.parts.len();
+        let size = if count == 1 { rays.len().max(1) } else { rays.len().div_ceil(4 * count).max(1) };
+        let jobs: Vec<&[Ray<D>]> = rays.chunks(size).collect();
+        let job = |part: &Part, i: usize| {
+            let after = after.map(|after| &after[i * size..i * size + jobs[i].len()]);
+            self.first_hits_on(part, jobs[i], after, progress)
+        };
+        Ok(self.share(jobs.len(), job)?.concat())
+    }
+
+    fn open_fractions(
+        &self,
+        points: &[ShadingPoint<D>],
+        sampling: &Sampling,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Estimate>, TraceError> {
+        self.estimate(points, sampling, progress)
+    }
+
+    fn is_apart(&self) -> bool {
+        self.parts.iter().all(|part| part.device.info.kind != Kind::Cpu)
     }
 }
 
@@ -235,26 +287,36 @@ pub(super) fn is_exact<const D: usize>(scale: &Scale<D>, point: &Vector<D>) -> b
     (0..D).all(|i| scaled[i].is_finite() && f64::from(scaled[i]) == f64::from(point[i]) * scale.factor)
 }
 
+/// A point as the device knows it, so far as its rays are concerned.
+pub(super) fn sampled_point<const D: usize>(frame: &Frame<D>, sequence: &Sequence) -> layout::Point {
+    let (axis, factor, turned) = frame.parts();
+    let keys = match &sequence.source {
+        Source::Sobol(keys) => *keys,
+        Source::Random(_) => [0; 4],
+    };
+    let (turned, next) = (u32::from(turned), sequence.next);
+    layout::Point { axis: float4(axis), keys, factor, turned, next, ..layout::Point::default() }
+}
+
 /// Tries whether the device makes the host's directions, of some thousand rays.
 fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, matrices: &Memory<u32>) -> Result<bool, Error> {
-    const SITES: u64 = 64;
+    const POINTS: u64 = 64;
     const RAYS: u32 = 128;
-    let frame = |site: u64| {
-        let normal = Vector::<D>::from_fn(|i, _| ((site * 7 + 3 * i as u64) % 11) as f32 - 4.9).normalize();
-        crate::geometry::Frame::new(&normal)
+    let frame = |point: u64| {
+        let normal = Vector::<D>::from_fn(|i, _| ((point * 7 + 3 * i as u64) % 11) as f32 - 4.9).normalize();
+        Frame::new(&normal)
     };
-    let sequence = |site| Sequence::new(Sampler::Sobol, 1, site);
-    let sites: Vec<layout::Site> =
-        (0..SITES).map(|site| super::points::sampled_site(&frame(site), &sequence(site))).collect();
-    let count = (SITES * u64::from(RAYS)) as usize;
-    let (sites, out) = (device.filled(&sites, "points")?, device.empty::<Float4>(count, "results")?);
-    let arguments = [sites.argument(), matrices.argument(), Argument::U32(RAYS), out.argument()];
+    let sequence = |point| Sequence::new(Sampler::Sobol, 1, point);
+    let points: Vec<layout::Point> = (0..POINTS).map(|point| sampled_point(&frame(point), &sequence(point))).collect();
+    let count = (POINTS * u64::from(RAYS)) as usize;
+    let (points, out) = (device.input(&points, "points")?, device.output::<Float4>(count, "results")?);
+    let arguments = [points.argument(), matrices.argument(), Argument::U32(RAYS), out.argument()];
     device.launch(&kernels.directions, &arguments, count)?;
     let mut found = vec![Float4::default(); count];
     device.read(&out, &mut found)?;
     let mut found = found.iter();
-    Ok((0..SITES).all(|site| {
-        let (frame, mut sequence) = (frame(site), sequence(site));
+    Ok((0..POINTS).all(|point| {
+        let (frame, mut sequence) = (frame(point), sequence(point));
         (0..RAYS).all(|_| {
             let expected = float4(&sequence.next_direction::<D>(&frame)).0.map(f32::to_bits);
             found.next().is_some_and(|f| (0..D).all(|i| f.0[i].to_bits() == expected[i]))

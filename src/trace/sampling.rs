@@ -19,7 +19,48 @@ use crate::geometry::{Frame, Vector};
 
 /// Lowest squared cosine that a direction gets. A direction closer to the horizon is raised to it, so that rounding
 /// can't put it below; this touches 1.5 rays in a million, and moves each by less than 0.06 degrees.
-pub(super) const LOWEST_SQUARED_COSINE: f32 = 1e-6;
+pub(crate) const LOWEST_SQUARED_COSINE: f32 = 1e-6;
+
+/// Which rays are asked at a shading point, and which hits count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Where the rays go.
+    pub sampler: Sampler,
+    /// Rays a point, the most if there is a target; at least 1.
+    pub samples: u32,
+    /// Chooses among equally good sets of rays.
+    pub seed: u64,
+    /// Hits beyond this distance don't count; infinite by default.
+    pub max_distance: f32,
+    /// The largest standard error that is good enough, if fewer rays may do: looked at after [`Target::FEWEST`] rays and
+    /// whenever their number has doubled.
+    pub target: Option<Target>,
+}
+
+impl Sampling {
+    /// So many rays a point, Sobol' points, hits at any distance.
+    pub fn new(samples: u32, seed: u64) -> Self {
+        Self { sampler: Sampler::Sobol, samples, seed, max_distance: f32::INFINITY, target: None }
+    }
+
+    /// The same rays, by independent random points.
+    pub fn random(samples: u32, seed: u64) -> Self {
+        Self { sampler: Sampler::Random, ..Self::new(samples, seed) }
+    }
+}
+
+/// When to stop asking rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Enough if the standard error is not above this.
+    pub error: f32,
+}
+
+impl Target {
+    /// The fewest rays after which an error is trusted. After them, whenever their number has doubled, the error is
+    /// looked at: seldom, since whoever looks often enough will see a small one by chance.
+    pub const FEWEST: u32 = 64;
+}
 
 /// How the points of the cube are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,23 +74,23 @@ pub enum Sampler {
 /// The points of one shading point: `count` points of the unit (D-1)-cube.
 #[derive(Debug)]
 pub struct Sequence {
-    pub(super) source: Source,
-    pub(super) next: u32,
+    pub(crate) source: Source,
+    pub(crate) next: u32,
 }
 
 /// What makes the points.
 #[derive(Debug)]
-pub(super) enum Source {
+pub(crate) enum Source {
     /// Keys of the scramblings of the coordinates and of the index.
     Sobol([u32; 4]),
     Random(Box<ChaCha8Rng>),
 }
 
 impl Sequence {
-    /// The points for shading point number `site` under `seed`. Different sites and different seeds give independent
+    /// The points for shading point number `number` under `seed`. Different numbers and different seeds give independent
     /// points.
-    pub fn new(sampler: Sampler, seed: u64, site: u64) -> Self {
-        let mut state = mix(seed ^ mix(site.wrapping_add(0x9e37_79b9_7f4a_7c15)));
+    pub fn new(sampler: Sampler, seed: u64, number: u64) -> Self {
+        let mut state = mix(seed ^ mix(number.wrapping_add(0x9e37_79b9_7f4a_7c15)));
         let source = match sampler {
             Sampler::Random => Source::Random(Box::new(ChaCha8Rng::seed_from_u64(state))),
             Sampler::Sobol => Source::Sobol(std::array::from_fn(|_| {
@@ -61,7 +102,7 @@ impl Sequence {
     }
 
     /// How its points are chosen.
-    pub(super) fn sampler(&self) -> Sampler {
+    pub(crate) fn sampler(&self) -> Sampler {
         match self.source {
             Source::Sobol(_) => Sampler::Sobol,
             Source::Random(_) => Sampler::Random,
@@ -125,13 +166,13 @@ fn mix(mut x: u64) -> u64 {
 /// Nested uniform scrambling of the bits of `x`, highest first, by a hash: each bit is flipped by a function of the
 /// key and the bits above it (Laine and Karras 2011, with Vegdahl's constants).
 #[inline]
-pub(super) fn scramble(x: u32, key: u32) -> u32 {
+pub(crate) fn scramble(x: u32, key: u32) -> u32 {
     scramble_reversed(x.reverse_bits(), key).reverse_bits()
 }
 
 /// The same for a number, and with a result, whose lowest bit is the first.
 #[inline(always)]
-pub(super) fn scramble_reversed(x: u32, key: u32) -> u32 {
+pub(crate) fn scramble_reversed(x: u32, key: u32) -> u32 {
     let mut x = x;
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(key);
@@ -145,7 +186,7 @@ pub(super) fn scramble_reversed(x: u32, key: u32) -> u32 {
 const SOBOL: [[u32; 32]; 2] = [sobol_matrix(1, 0, &[1]), sobol_matrix(2, 1, &[1, 3])];
 
 /// The direction numbers of the second and third dimension, one after the other.
-pub(super) fn sobol_matrices() -> Vec<u32> {
+pub(crate) fn sobol_matrices() -> Vec<u32> {
     SOBOL.concat()
 }
 
@@ -171,7 +212,7 @@ const fn sobol_matrix(s: usize, a: u32, m: &[u32]) -> [u32; 32] {
 
 /// Coordinate `dimension` (0, 1 or 2) of Sobol' point `index`, as a binary fraction of 32 bits.
 #[inline]
-pub(super) const fn sobol(mut index: u32, dimension: usize) -> u32 {
+pub(crate) const fn sobol(mut index: u32, dimension: usize) -> u32 {
     if dimension == 0 {
         return index.reverse_bits();
     }
@@ -310,9 +351,9 @@ mod tests {
     }
 
     #[test]
-    fn sequences_depend_on_seed_and_site_only() {
+    fn sequences_depend_on_seed_and_number_only() {
         for sampler in [Sampler::Sobol, Sampler::Random] {
-            let first = |seed, site| Sequence::new(sampler, seed, site).next_point::<3>();
+            let first = |seed, number| Sequence::new(sampler, seed, number).next_point::<3>();
             assert_eq!(first(1, 2), first(1, 2));
             assert_ne!(first(1, 2), first(1, 3));
             assert_ne!(first(1, 2), first(2, 2));

@@ -1,6 +1,6 @@
 //! What the simplices around a vertex hide of its own hemisphere.
 //!
-//! A simplex with a corner at the vertex hides the cone of its edges and -n ([`super::super::Site`]). On a smooth surface
+//! A simplex with a corner at the vertex hides the cone of its edges and -n ([`crate::trace::Surroundings`]). On a smooth surface
 //! that is a sliver at the horizon: with s n for the part along the normal, a direction of the cone is
 //! w = sum mu_i e_i - s n, so its height over the tangent hyperplane is at most that of a vector in the simplex's own
 //! hyperplane, which is at most the sine of the angle between the two hyperplanes. Rays above all of these
@@ -9,17 +9,17 @@
 use super::cones::{Cones, dot};
 use super::directions::Rays;
 use super::lanes::Lanes;
-use super::question::Question;
+use super::query::Query;
 use crate::accel::WIDTH;
 use crate::geometry::Vector;
-use crate::occlusion::site::fold_cone;
+use crate::trace::surroundings::star_cone;
 
 /// Rounding of the height of an edge, relative to its 1-norm: twice what D differences, products and sums make.
 const HEIGHT_ROUNDING: f32 = 16.0 / (1 << 24) as f32;
 
 /// The cones of the simplices around a vertex, eight by eight.
 #[derive(Debug)]
-pub(super) struct Fold<const D: usize> {
+pub(super) struct VertexStar<const D: usize> {
     cones: Vec<Cones<D>>,
     count: usize,
     /// Nothing is hidden above this height.
@@ -28,7 +28,7 @@ pub(super) struct Fold<const D: usize> {
     identity: u32,
 }
 
-impl<const D: usize> Fold<D> {
+impl<const D: usize> VertexStar<D> {
     pub fn new() -> Self {
         Self { cones: Vec::new(), count: 0, height: -1.0, normal: Vector::zeros(), identity: 0 }
     }
@@ -40,14 +40,14 @@ impl<const D: usize> Fold<D> {
 
     /// For a vertex, with the simplices around it.
     #[inline(always)]
-    pub fn set<L: Lanes>(&mut self, question: &Question<D>, normal: Vector<D>, identity: u32, around: &[u32]) {
+    pub fn set<L: Lanes>(&mut self, query: &Query<D>, normal: Vector<D>, identity: u32, around: &[u32]) {
         self.clear();
         (self.normal, self.identity) = (normal, identity);
         for simplices in around.chunks(WIDTH) {
             if self.cones.len() == self.count {
                 self.cones.push(Cones::new());
             }
-            let height = self.set_block::<L>(question, simplices);
+            let height = self.set_block::<L>(query, simplices);
             self.height = self.height.max(height);
             self.count += 1;
         }
@@ -55,14 +55,14 @@ impl<const D: usize> Fold<D> {
 
     /// The next eight; returns the height above which they hide nothing.
     #[inline(always)]
-    fn set_block<L: Lanes>(&mut self, question: &Question<D>, simplices: &[u32]) -> f32 {
-        let mesh = question.tracer.mesh();
+    fn set_block<L: Lanes>(&mut self, query: &Query<D>, simplices: &[u32]) -> f32 {
+        let mesh = query.tracer.mesh();
         let mut rows = [[[0.0f32; WIDTH]; D]; D];
         for lane in 0..WIDTH {
             let simplex = mesh.simplices[simplices[lane.min(simplices.len() - 1)] as usize];
             let others = simplex.into_iter().filter(|&v| mesh.identity[v as usize] != self.identity);
             for (row, vertex) in rows.iter_mut().zip(others) {
-                let edge = question.wide.scale.scaled(&mesh.vertices[vertex as usize]) - question.scaled;
+                let edge = query.wide.scale.scaled(&mesh.vertices[vertex as usize]) - query.scaled;
                 (0..D).for_each(|k| row[k][lane] = edge[k]);
             }
         }
@@ -104,7 +104,7 @@ impl<const D: usize> Fold<D> {
 
     /// Which of the rays are hidden.
     #[inline(always)]
-    pub fn hidden<L: Lanes>(&self, question: &Question<D>, rays: &Rays<D>, around: &[u32], alive: u64) -> u64 {
+    pub fn hidden<L: Lanes>(&self, query: &Query<D>, rays: &Rays<D>, around: &[u32], alive: u64) -> u64 {
         if self.count == 0 {
             return 0;
         }
@@ -120,7 +120,7 @@ impl<const D: usize> Fold<D> {
                     continue;
                 }
                 let verdict = cones.judge::<L>(candidates, &direction);
-                if verdict.inside != 0 || self.exactly(question, rays, i, simplices, verdict.doubtful) {
+                if verdict.inside != 0 || self.exactly(query, rays, i, simplices, verdict.doubtful) {
                     hidden |= 1 << i;
                     break;
                 }
@@ -130,11 +130,11 @@ impl<const D: usize> Fold<D> {
     }
 
     #[cold]
-    fn exactly(&self, question: &Question<D>, rays: &Rays<D>, i: usize, simplices: &[u32], doubtful: u8) -> bool {
-        let direction = question.ray(rays, i).direction;
+    fn exactly(&self, query: &Query<D>, rays: &Rays<D>, i: usize, simplices: &[u32], doubtful: u8) -> bool {
+        let direction = query.ray(rays, i).direction;
         (simplices.iter().enumerate()).filter(|(lane, _)| doubtful >> lane & 1 == 1).any(|(_, &simplex)| {
-            let mesh = question.tracer.mesh();
-            fold_cone(mesh, question.position, self.normal, self.identity, simplex)
+            let mesh = query.tracer.mesh();
+            star_cone(mesh, query.position, self.normal, self.identity, simplex)
                 .is_some_and(|cone| cone.contains(&direction))
         })
     }

@@ -1,6 +1,6 @@
-//! Eight `f32` side by side, and the few operations the stream engine needs on them.
+//! Eight `f32` side by side, and the few operations the packet tracer needs on them.
 //!
-//! The engine is written once against the trait [`Lanes`] and compiled for each [`Level`] of instructions; which one
+//! The engine is written once against the trait [`Lanes`] and compiled for each [`super::Level`] of instructions; which one
 //! runs is chosen at run time. Levels may round differently (one fuses multiplications into additions, another
 //! doesn't), as every value computed here is only a filter whose rounding is bounded: what the filter can't decide goes
 //! to exact arithmetic. So all levels give the same results.
@@ -9,39 +9,6 @@ use crate::accel::WIDTH;
 
 /// One row of lanes in memory: a number for each simplex of a leaf, or for each child of a node.
 pub(super) type Row = [f32; WIDTH];
-
-/// The instructions that are used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
-    /// What the compiler makes of plain loops: any processor.
-    Portable,
-    /// AVX2 with fused multiplication and addition: x86-64 since 2013.
-    Avx2,
-    /// The masks of AVX-512, on registers of 256 bits.
-    Avx512,
-}
-
-impl Level {
-    /// What this processor offers, slowest first.
-    pub fn available() -> Vec<Self> {
-        let mut levels = vec![Self::Portable];
-        #[cfg(target_arch = "x86_64")]
-        {
-            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") && is_x86_feature_detected!("bmi2") {
-                levels.push(Self::Avx2);
-                if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
-                    levels.push(Self::Avx512);
-                }
-            }
-        }
-        levels
-    }
-
-    /// The fastest level of this processor.
-    pub fn best() -> Self {
-        Self::available().into_iter().max().unwrap_or(Self::Portable)
-    }
-}
 
 /// Eight numbers. Code that is generic over them must be inlined into the function compiled for the level, so it uses plain
 /// loops: a closure handed to an iterator is compiled apart, without the level's instructions. A mask has the bit of each lane, lane 0 lowest.

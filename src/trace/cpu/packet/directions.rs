@@ -5,10 +5,10 @@
 //! does not notice. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
 //! taken in ascending order, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
 
-use super::super::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, scramble_reversed, sobol};
 use super::lanes::Lanes;
 use crate::accel::WIDTH;
 use crate::geometry::{Frame, Vector};
+use crate::trace::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, scramble_reversed, sobol};
 
 /// Rays of a block; the bits of a `u64` name them.
 pub(super) const BLOCK: usize = 64;
@@ -295,7 +295,7 @@ fn unit(bits: u32) -> f32 {
     ((bits >> 8) as i32 as f32 + 0.5) * (1.0 / (1 << 23) as f32) - 1.0
 }
 
-/// [`super::super::square_to_disk`] without branches.
+/// [`crate::trace::square_to_disk`] without branches.
 #[inline(always)]
 fn square_to_disk(a: f32, b: f32) -> [f32; 2] {
     let first = a.abs() > b.abs();
@@ -310,7 +310,7 @@ fn square_to_disk(a: f32, b: f32) -> [f32; 2] {
     if first { [u, v] } else { [v, u] }
 }
 
-/// The rest of [`super::super::cube_to_ball`], without branches: (x, y) is where the disk's map takes (a, b).
+/// The rest of [`crate::trace::cube_to_ball`], without branches: (x, y) is where the disk's map takes (a, b).
 #[inline(always)]
 fn disk_to_ball(a: f32, b: f32, c: f32, x: f32, y: f32) -> [f32; 3] {
     let larger = |p: f32, q: f32| if p > q { p } else { q };
@@ -331,7 +331,7 @@ fn disk_to_ball(a: f32, b: f32, c: f32, x: f32, y: f32) -> [f32; 3] {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::occlusion::Sampler;
+    use crate::trace::Sampler;
 
     fn same_bits<const D: usize>() {
         for (site, sampler) in (0..300).flat_map(|site| [(site, Sampler::Sobol), (site, Sampler::Random)]) {
@@ -365,8 +365,8 @@ mod tests {
         let values = [-1.0 + 1e-7, -0.7, -0.5, -1e-7, 0.0, 6e-8, 0.3, 0.5, 0.7, 0.999];
         for (a, b, c) in values.iter().flat_map(|&a| values.iter().flat_map(move |&b| values.map(|c| (a, b, c)))) {
             let [x, y] = square_to_disk(a, b);
-            assert_eq!([x, y], crate::occlusion::square_to_disk(a, b));
-            assert_eq!(disk_to_ball(a, b, c, x, y), crate::occlusion::cube_to_ball(a, b, c));
+            assert_eq!([x, y], crate::trace::square_to_disk(a, b));
+            assert_eq!(disk_to_ball(a, b, c, x, y), crate::trace::cube_to_ball(a, b, c));
         }
     }
 }

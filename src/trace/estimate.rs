@@ -17,7 +17,7 @@
 //! Where all groups agree there is no scatter, and yet no certainty. No ray out of N going the other way means, at 95 %,
 //! a share below 3/N (the rule of three), which are two standard errors of 1.5/N. No estimate is below that.
 
-use super::Sampler;
+use super::sampling::{Sampler, Target};
 
 /// Groups there are, once as many rays are known.
 const LEAST_GROUPS: usize = 8;
@@ -47,28 +47,17 @@ impl Estimate {
     }
 }
 
-/// When to stop asking rays.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Target {
-    /// Enough if the standard error is not above this.
-    pub error: f32,
-}
-
 impl Target {
-    /// The fewest rays after which an error is trusted. After them, whenever their number has doubled, the error is
-    /// looked at: seldom, since whoever looks often enough will see a small one by chance.
-    pub const FEWEST: u32 = 64;
-
     /// Whether the rays so far are enough.
-    pub(super) fn is_met(&self, tally: &Tally) -> bool {
-        let rays = tally.rays();
-        rays >= Self::FEWEST && rays.is_power_of_two() && tally.error() <= f64::from(self.error)
+    pub(crate) fn is_met(&self, accumulator: &Accumulator) -> bool {
+        let rays = accumulator.rays();
+        rays >= Self::FEWEST && rays.is_power_of_two() && accumulator.error() <= f64::from(self.error)
     }
 }
 
 /// Counts of rays that escape, by group. Groups grow as rays come in, so their number need not be known before.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tally {
+pub(crate) struct Accumulator {
     /// Rays of each finished group that escape.
     groups: [u32; 2 * LEAST_GROUPS],
     finished: usize,
@@ -81,7 +70,7 @@ pub(super) struct Tally {
     independent: bool,
 }
 
-impl Tally {
+impl Accumulator {
     pub fn new(sampler: Sampler) -> Self {
         let independent = sampler == Sampler::Random;
         Self { groups: [0; 2 * LEAST_GROUPS], finished: 0, size: 1, begun: 0, open: 0, independent }
@@ -154,6 +143,7 @@ impl Tally {
         scatter * count / (count - 1.0).max(1.0) / (grouped * grouped) * share
     }
 
+    /// What they say together.
     pub fn estimate(&self) -> Estimate {
         let value = f64::from(self.escaped()) / f64::from(self.rays());
         Estimate { value: value as f32, error: self.error() as f32, rays: self.rays() }
@@ -169,10 +159,10 @@ fn bound(rays: u32) -> f64 {
 mod tests {
     use super::*;
 
-    fn tally(rays: &[bool]) -> Tally {
-        let mut tally = Tally::new(Sampler::Sobol);
-        rays.iter().for_each(|&ray| tally.add(u64::from(ray), 1));
-        tally
+    fn accumulator(rays: &[bool]) -> Accumulator {
+        let mut accumulator = Accumulator::new(Sampler::Sobol);
+        rays.iter().for_each(|&ray| accumulator.add(u64::from(ray), 1));
+        accumulator
     }
 
     /// Looks random, with a share of 1/3.
@@ -184,7 +174,7 @@ mod tests {
     fn groups_are_what_they_are_said_to_be() {
         for count in 1..700 {
             let rays = pattern(count);
-            let found = tally(&rays);
+            let found = accumulator(&rays);
             assert_eq!(found.rays(), count);
             assert_eq!(found.escaped(), rays.iter().filter(|&&r| r).count() as u32);
             if count < 2 {
@@ -207,19 +197,19 @@ mod tests {
     #[test]
     fn independent_rays_are_groups_of_their_own() {
         let rays = pattern(300);
-        let mut tally = Tally::new(Sampler::Random);
-        rays.iter().for_each(|&ray| tally.add(u64::from(ray), 1));
+        let mut accumulator = Accumulator::new(Sampler::Random);
+        rays.iter().for_each(|&ray| accumulator.add(u64::from(ray), 1));
         let share = rays.iter().filter(|&&r| r).count() as f64 / 300.0;
-        assert!((tally.error() - (share * (1.0 - share) / 299.0).sqrt()).abs() < 1e-12);
+        assert!((accumulator.error() - (share * (1.0 - share) / 299.0).sqrt()).abs() < 1e-12);
     }
 
     #[test]
     fn words_count_like_single_rays() {
         let rays = pattern(64 * 40);
-        let mut words = Tally::new(Sampler::Sobol);
+        let mut words = Accumulator::new(Sampler::Sobol);
         for (n, word) in rays.chunks(64).enumerate() {
             words.add(word.iter().rev().fold(0, |w, &r| w << 1 | u64::from(r)), 64);
-            let single = tally(&rays[..64 * (n + 1)]);
+            let single = accumulator(&rays[..64 * (n + 1)]);
             assert_eq!(words.estimate(), single.estimate());
             assert_eq!(words.groups, single.groups);
         }
@@ -229,9 +219,9 @@ mod tests {
     fn agreement_is_not_certainty() {
         for all in [true, false] {
             for count in [1u32, 5, 64, 100, 1 << 20] {
-                let mut tally = Tally::new(Sampler::Sobol);
-                (0..count).for_each(|_| tally.add(u64::from(all), 1));
-                let estimate = tally.estimate();
+                let mut accumulator = Accumulator::new(Sampler::Sobol);
+                (0..count).for_each(|_| accumulator.add(u64::from(all), 1));
+                let estimate = accumulator.estimate();
                 assert_eq!(estimate.value, f32::from(u8::from(all)));
                 assert_eq!(estimate.error, (1.5 / f64::from(count)).min(1.0) as f32);
             }
@@ -243,8 +233,8 @@ mod tests {
         let easy = Target { error: 0.5 };
         for count in 1..300 {
             let expected = [64, 128, 256].contains(&count);
-            assert_eq!(easy.is_met(&tally(&pattern(count))), expected, "{count}");
+            assert_eq!(easy.is_met(&accumulator(&pattern(count))), expected, "{count}");
         }
-        assert!(!Target { error: 1e-4 }.is_met(&tally(&pattern(256))));
+        assert!(!Target { error: 1e-4 }.is_met(&accumulator(&pattern(256))));
     }
 }

@@ -1,13 +1,16 @@
-//! Occlusion only where it is wanted: the same bits there, and the same pictures as with all values.
+//! Occlusion only where a mask asks for it: the same bits there, and the same pictures as with all values.
 
 use std::path::Path;
 
 use ao4d::accel::Tracer;
+use ao4d::geometry::Vector;
 use ao4d::mesh::Mesh;
 use ao4d::occlusion::exact::Budget;
-use ao4d::occlusion::{Method, Sampler, Settings, Slips, Target};
+use ao4d::occlusion::{Deviations, Estimator};
 use ao4d::pipeline::{self, Pipeline, Report};
 use ao4d::progress::Silent;
+use ao4d::trace::cpu::CpuBackend;
+use ao4d::trace::{Sampling, ShadingPoint, Target};
 
 mod support;
 
@@ -15,37 +18,49 @@ use support::{Random, mesh};
 
 fn same_bits<const D: usize>() {
     let mesh: Mesh<D> = mesh(&Random(2).soup(40, 0.6, false));
-    let tracer = Tracer::new(&mesh);
-    let sobol = Settings { sampler: Sampler::Sobol, samples: 96, seed: 3, max_distance: f32::INFINITY };
+    let mut points = ShadingPoint::vertices(&mesh);
+    for simplex in 0..mesh.simplices.len() as u32 {
+        let position = mesh.corners(simplex).into_iter().sum::<Vector<D>>() / D as f32;
+        let normal = mesh.normals[mesh.simplices[simplex as usize][0] as usize];
+        points.push(ShadingPoint::Inside { position, normal, simplex, number: u64::from(simplex) });
+    }
+    let backend = CpuBackend::new(Tracer::new(mesh));
+    let sobol = Sampling::new(96, 3);
     let target = Some(Target { error: 0.05 });
-    let methods = [
-        Method::Sampled(sobol, None),
-        Method::Sampled(Settings { sampler: Sampler::Random, ..sobol }, target),
-        Method::Adaptive(sobol, target),
-        Method::Exact(Budget::default()),
-        Method::AsPublished(sobol, Slips::PUBLISHED),
+    let estimators = [
+        Estimator::Sampled(sobol),
+        Estimator::Sampled(Sampling { target, ..Sampling::random(96, 3) }),
+        Estimator::Adaptive(Sampling { target, ..sobol }),
+        Estimator::Exact(Budget::default()),
+        Estimator::AsPublished(sobol, Deviations::PUBLISHED),
     ];
-    let wanted: Vec<bool> = (0..mesh.vertices.len()).map(|v| v % 3 == 1).collect();
-    for method in methods {
-        let all = method.at_vertices(&tracer, &Silent).unwrap();
-        let some = method.at_wanted(&tracer, Some(&wanted), &Silent).unwrap();
-        assert!(all.values.iter().any(|&v| v < 1.0), "{method:?}");
-        for (v, wanted) in wanted.iter().enumerate() {
-            let expected = if *wanted { (all.values[v], all.errors[v]) } else { (1.0, some.errors[v]) };
+    let mask: Vec<bool> = (0..points.len()).map(|v| v % 3 == 1).collect();
+    for estimator in estimators {
+        let all = estimator.estimate(&backend, &points, None, &Silent).unwrap();
+        let some = estimator.estimate(&backend, &points, Some(&mask), &Silent).unwrap();
+        assert!(all.values.iter().any(|&v| v < 1.0), "{estimator:?}");
+        for (v, &asked) in mask.iter().enumerate() {
+            let expected = if asked { (all.values[v], all.errors[v]) } else { (1.0, f32::NAN) };
             assert_eq!(
                 (some.values[v].to_bits(), some.errors[v].to_bits()),
                 (expected.0.to_bits(), expected.1.to_bits())
             );
         }
-        assert!(some.rays < all.rays || all.rays == 0, "{method:?}: {} of {} rays", some.rays, all.rays);
+        assert!(some.rays < all.rays || all.rays == 0, "{estimator:?}: {} of {} rays", some.rays, all.rays);
         assert!(some.error().is_finite());
+        // Points in another order have the same values.
+        let back: Vec<_> = points.iter().rev().copied().collect();
+        let mut backwards = estimator.estimate(&backend, &back, None, &Silent).unwrap();
+        backwards.values.reverse();
+        backwards.errors.reverse();
+        assert_eq!(backwards, all, "{estimator:?}");
     }
-    let none = Method::Sampled(sobol, None).at_wanted(&tracer, Some(&vec![false; mesh.vertices.len()]), &Silent);
+    let none = Estimator::Sampled(sobol).estimate(&backend, &points, Some(&vec![false; points.len()]), &Silent);
     assert_eq!(none.unwrap().rays, 0);
 }
 
 #[test]
-fn wanted_values_are_those_of_all() {
+fn masked_values_are_those_of_all() {
     same_bits::<3>();
     same_bits::<4>();
 }

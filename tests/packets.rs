@@ -3,9 +3,11 @@
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Ray, Vector, Vector64};
-use ao4d::mesh::{Incidence, Surface};
-use ao4d::occlusion::{Level, Sampler, Settings, Site, Stream, ambient_occlusion, at_vertices, at_vertices_with};
+use ao4d::mesh::{Mesh, Surface};
+use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
+use ao4d::trace::cpu::{CpuBackend, Level, PacketTracer, ScalarBackend};
+use ao4d::trace::{RayBackend, Sampler, Sampling, ShadingPoint, Target};
 
 mod support;
 
@@ -53,48 +55,74 @@ fn moved<const D: usize>(mut surface: Surface<D>, factor: f64, by: f64) -> Surfa
     surface
 }
 
-fn settings(sampler: Sampler, samples: u32, max_distance: f32) -> Settings {
-    Settings { sampler, samples, seed: 5, max_distance }
+fn sampling(sampler: Sampler, samples: u32, max_distance: f32) -> Sampling {
+    Sampling { sampler, max_distance, ..Sampling::new(samples, 5) }
 }
 
-/// The values of all levels and the slow ones are the same.
-fn check<const D: usize>(name: &str, surface: &Surface<D>, settings: &Settings) -> Vec<f32> {
-    let mesh = mesh(surface);
-    let tracer = Tracer::new(&mesh);
-    let incidence = Incidence::new(&mesh);
-    let slow: Vec<f32> = (0..mesh.vertices.len() as u32)
-        .map(|v| ambient_occlusion(&tracer, &Site::at_vertex(&tracer, &incidence, v), settings, u64::from(v)))
-        .collect();
-    for level in Level::available() {
-        let fast = at_vertices_with(level, &tracer, settings, &Silent).unwrap();
-        for (v, (fast, slow)) in fast.iter().zip(&slow).enumerate() {
-            assert_eq!(fast.to_bits(), slow.to_bits(), "{name}, D = {D}, {level:?}, vertex {v}: {fast} {slow}");
+/// Points inside the simplices, and some off them, with normals that look anywhere.
+fn visible_points<const D: usize>(mesh: &Mesh<D>, random: &mut Random) -> Vec<ShadingPoint<D>> {
+    let count = mesh.simplices.len().min(60) as u32;
+    let point = |n: u32| {
+        let simplex = n * mesh.simplices.len() as u32 / count;
+        let corners = mesh.corners(simplex);
+        let weights: [f32; D] = std::array::from_fn(|_| random.point::<D>(false)[0].abs() as f32 + 0.01);
+        let total: f32 = weights.iter().sum();
+        let inside = (0..D).fold(Vector::zeros(), |sum: Vector<D>, i| sum + corners[i] * (weights[i] / total));
+        let normal = random.point::<D>(false).map(|x| x as f32).normalize();
+        let off = if n % 9 == 8 { 3.0 } else { 1.0 };
+        ShadingPoint::Inside { position: inside * off, normal, simplex, number: u64::from(n) * 7 }
+    };
+    (0..count).map(point).collect()
+}
+
+/// Values and errors by rays.
+fn estimate<const D: usize>(backend: &dyn RayBackend<D>, points: &[ShadingPoint<D>], sampling: &Sampling) -> Estimates {
+    Estimator::Sampled(*sampling).estimate(backend, points, None, &Silent).unwrap()
+}
+
+/// The values of all levels and the slow ones are the same, at vertices and at visible points.
+fn check<const D: usize>(name: &str, surface: &Surface<D>, sampling: &Sampling) -> Vec<f32> {
+    let tracer = std::sync::Arc::new(Tracer::new(mesh(surface)));
+    let vertices = ShadingPoint::vertices(tracer.mesh());
+    let points = [vertices.clone(), visible_points(tracer.mesh(), &mut Random(11))].concat();
+    let mut values = Vec::new();
+    for target in [None, Some(Target { error: 0.04 })] {
+        let sampling = Sampling { target, ..*sampling };
+        let slow = estimate(&ScalarBackend::new(tracer.clone()), &points, &sampling);
+        for level in Level::available() {
+            let fast = estimate(&CpuBackend::with_level(tracer.clone(), level), &points, &sampling);
+            assert_eq!(fast.rays, slow.rays, "{name}, D = {D}, {level:?}");
+            for (i, point) in points.iter().enumerate() {
+                let [found, expected] = [&fast, &slow].map(|e| (e.values[i].to_bits(), e.errors[i].to_bits()));
+                assert_eq!(found, expected, "{name}, D = {D}, {level:?}, {target:?}, {point:?}");
+            }
         }
+        values.push(slow.values);
     }
-    slow
+    values[0][..vertices.len()].to_vec()
 }
 
 fn scenes<const D: usize>() {
-    let sobol = settings(Sampler::Sobol, 64, f32::INFINITY);
+    let sobol = sampling(Sampler::Sobol, 64, f32::INFINITY);
     let few = if D == 3 { 12 } else { 5 };
     let bumps = |x: &[f64]| x.iter().map(|x| 0.2 * (9.0 * x).sin()).sum();
     let fold = |x: &[f64]| (x[0] - 0.5).abs();
     let crease = |x: &[f64]| -2.0 * (x[0] - 0.5).abs().min((x[1] - 0.5).abs());
     let step = |x: &[f64]| if x[0] > 0.5 { 0.3 } else { 0.0 };
     let tilt = |x: &[f64]| x.iter().sum::<f64>() * 0.3;
-    let dark = |name: &str, surface: &Surface<D>, settings: &Settings| {
-        let values = check(name, surface, settings);
-        let rays = values.len() as f64 * f64::from(settings.samples);
-        let visible = values.iter().map(|&v| f64::from(v) * f64::from(settings.samples)).sum::<f64>();
+    let dark = |name: &str, surface: &Surface<D>, sampling: &Sampling| {
+        let values = check(name, surface, sampling);
+        let rays = values.len() as f64 * f64::from(sampling.samples);
+        let visible = values.iter().map(|&v| f64::from(v) * f64::from(sampling.samples)).sum::<f64>();
         let blocked = rays - visible;
         assert!(visible > 100.0 && blocked > 100.0, "{name}: {visible} and {blocked} rays: nothing is tested");
     };
     dark("soup", &soup(1, 300, 0.3, false), &sobol);
-    dark("dense soup", &soup(1, 100, 1.0, false), &settings(Sampler::Sobol, 100, f32::INFINITY));
+    dark("dense soup", &soup(1, 100, 1.0, false), &sampling(Sampler::Sobol, 100, f32::INFINITY));
     dark("coarse soup", &soup(2, 60, 0.5, true), &sobol);
-    dark("coarse soup", &soup(3, 70, 0.5, true), &settings(Sampler::Random, 77, f32::INFINITY));
+    dark("coarse soup", &soup(3, 70, 0.5, true), &sampling(Sampler::Random, 77, f32::INFINITY));
     dark("bumps", &graph(few, bumps), &sobol);
-    dark("bumps", &graph(few, bumps), &settings(Sampler::Sobol, 200, f32::INFINITY));
+    dark("bumps", &graph(few, bumps), &sampling(Sampler::Sobol, 200, f32::INFINITY));
     dark("fold", &graph(few, fold), &sobol);
     dark("crease", &graph(few, crease), &sobol);
     dark("step", &graph(few, step), &sobol);
@@ -109,8 +137,8 @@ fn scenes<const D: usize>() {
     slivers.vertices.iter_mut().for_each(|v| v[1] = v[1].mul_add(1e-6, v[0]));
     check("slivers", &slivers, &sobol);
     // Limited distance.
-    dark("near only", &soup(1, 200, 0.3, false), &settings(Sampler::Sobol, 64, 0.4));
-    dark("near only, coarse", &soup(2, 60, 0.5, true), &settings(Sampler::Sobol, 64, 0.5));
+    dark("near only", &soup(1, 200, 0.3, false), &sampling(Sampler::Sobol, 64, 0.4));
+    dark("near only, coarse", &soup(2, 60, 0.5, true), &sampling(Sampler::Sobol, 64, 0.5));
     // A speck in a large scene, whose products vanish in single precision.
     let mut speck = soup::<D>(6, 40, 0.5, false);
     let small = moved(soup::<D>(7, 40, 0.5, false), 1e-13, 0.0);
@@ -135,7 +163,7 @@ fn any_rays<const D: usize>() {
     let mut random = Random(3);
     for coarse in [false, true] {
         let mesh = mesh(&soup::<D>(8, 80, 0.6, coarse));
-        let tracer = Tracer::new(&mesh);
+        let tracer = Tracer::new(mesh);
         let mut all = 0;
         for n in 0..200 {
             let origin = random.point::<D>(coarse).map(|x| x as f32) * if n % 10 == 0 { 5.0 } else { 1.0 };
@@ -150,8 +178,14 @@ fn any_rays<const D: usize>() {
             let expected = rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
             all += expected;
             for level in Level::available() {
-                let found =
-                    Stream::new(level).count_occluded(&tracer, &origin, directions[0], &directions, limit, ignored);
+                let found = PacketTracer::new(level).count_occluded(
+                    &tracer,
+                    &origin,
+                    directions[0],
+                    &directions,
+                    limit,
+                    ignored,
+                );
                 assert_eq!(found, expected, "{level:?} {n}");
             }
         }
@@ -168,21 +202,23 @@ fn any_rays_from_anywhere() {
 #[test]
 fn no_simplices_and_no_vertices() {
     let empty = mesh::<4>(&Surface { vertices: vec![], simplices: vec![], normals: None });
-    let sobol = settings(Sampler::Sobol, 64, f32::INFINITY);
-    assert_eq!(at_vertices(&Tracer::new(&empty), &sobol, &Silent), Ok(vec![]));
+    let sobol = sampling(Sampler::Sobol, 64, f32::INFINITY);
+    assert_eq!(estimate(&CpuBackend::new(Tracer::new(empty)), &[], &sobol), Estimates::default());
     let points =
         mesh::<3>(&Surface { vertices: vec![Vector64::zeros(); 3], simplices: vec![[0, 1, 2]], normals: None });
-    assert_eq!(at_vertices(&Tracer::new(&points), &sobol, &Silent), Ok(vec![1.0; 3]));
+    let vertices = ShadingPoint::vertices(&points);
+    assert_eq!(estimate(&CpuBackend::new(Tracer::new(points)), &vertices, &sobol).values, vec![1.0; 3]);
 }
 
 #[test]
 fn the_number_of_threads_changes_nothing() {
-    let mesh = mesh(&soup::<4>(9, 400, 0.3, false));
-    let tracer = Tracer::new(&mesh);
-    let sobol = settings(Sampler::Sobol, 64, f32::INFINITY);
+    let backend = CpuBackend::new(Tracer::new(mesh(&soup::<4>(9, 400, 0.3, false))));
+    let mesh = backend.tracer().mesh();
+    let points = [ShadingPoint::vertices(mesh), visible_points(mesh, &mut Random(2))].concat();
+    let sobol = sampling(Sampler::Sobol, 64, f32::INFINITY);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| at_vertices(&tracer, &sobol, &Silent).unwrap())
+        pool.install(|| estimate(&backend, &points, &sobol))
     };
     assert_eq!(with(1), with(3));
 }

@@ -2,8 +2,8 @@
 
 use std::mem::{offset_of, size_of};
 
-/// Stands for no simplex.
-pub(super) const NONE: u32 = u32::MAX;
+use bytemuck::{Pod, Zeroable};
+
 /// Stands for a simplex that the host has to find.
 pub(super) const UNSURE_SIMPLEX: u32 = u32::MAX - 1;
 /// What is known of a ray: nothing blocks it;
@@ -12,12 +12,12 @@ pub(super) const OPEN: u8 = 0;
 pub(super) const HIT: u8 = 1;
 
 /// A vector of the device.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub(super) struct Float4(pub [f32; 4]);
 
 /// A node of the hierarchy.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub(super) struct Node {
     pub low: Float4,
@@ -28,25 +28,25 @@ pub(super) struct Node {
 }
 
 /// A shading point.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
-pub(super) struct Site {
+pub(super) struct Point {
     pub position: Float4,
     pub axis: Float4,
     pub keys: [u32; 4],
     pub factor: f32,
     pub turned: u32,
     pub ignored: u32,
-    pub fold_first: u32,
-    pub fold_count: u32,
+    pub star_first: u32,
+    pub star_count: u32,
     pub next: u32,
     pub padding: [u32; 2],
 }
 
 /// A cone that a simplex with a corner at the point hides.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
-pub(super) struct Fold {
+pub(super) struct StarCone {
     pub normals: [Float4; 4],
     pub bounds: Float4,
 }
@@ -56,12 +56,12 @@ pub(super) fn sizes() -> Vec<u32> {
     [
         size_of::<Node>(),
         offset_of!(Node, first),
-        size_of::<Site>(),
-        offset_of!(Site, keys),
-        offset_of!(Site, factor),
-        offset_of!(Site, next),
-        size_of::<Fold>(),
-        offset_of!(Fold, bounds),
+        size_of::<Point>(),
+        offset_of!(Point, keys),
+        offset_of!(Point, factor),
+        offset_of!(Point, next),
+        size_of::<StarCone>(),
+        offset_of!(StarCone, bounds),
     ]
     .map(|bytes| bytes as u32)
     .to_vec()

@@ -5,8 +5,8 @@ use crate::accel::{Tracer, WideBvh};
 use crate::geometry::{Ray, Vector};
 
 /// One shading point among the simplices of a mesh.
-pub(super) struct Question<'t, const D: usize> {
-    pub tracer: &'t Tracer<'t, D>,
+pub(super) struct Query<'t, const D: usize> {
+    pub tracer: &'t Tracer<D>,
     pub wide: &'t WideBvh<D>,
     pub position: Vector<D>,
     /// The position in the coordinates of the leaves.
@@ -21,9 +21,9 @@ pub(super) struct Question<'t, const D: usize> {
     pub ignored: Option<u32>,
 }
 
-impl<'t, const D: usize> Question<'t, D> {
+impl<'t, const D: usize> Query<'t, D> {
     pub fn new(
-        tracer: &'t Tracer<'t, D>,
+        tracer: &'t Tracer<D>,
         position: Vector<D>,
         normal: Vector<D>,
         limit: f32,

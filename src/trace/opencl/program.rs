@@ -1,7 +1,7 @@
 //! The kernels' text, and what becomes of it on a device.
 
 use super::layout;
-use crate::occlusion::sampling::LOWEST_SQUARED_COSINE;
+use crate::trace::sampling::LOWEST_SQUARED_COSINE;
 
 const LAYOUT: &str = include_str!("../../../kernels/layout.cl");
 const SAMPLING: &str = include_str!("../../../kernels/sampling.cl");

@@ -7,6 +7,7 @@ use std::ffi::c_void;
 use std::marker::PhantomData;
 use std::ptr;
 
+use bytemuck::Pod;
 use opencl3::command_queue::CommandQueue;
 use opencl3::context::Context;
 use opencl3::error_codes::ClError;
@@ -16,8 +17,8 @@ use opencl3::program::Program;
 use opencl3::types::{CL_TRUE, cl_device_id, cl_mem};
 
 use super::devices::Info;
-use super::error::explain;
-use super::{Error, layout, program};
+use super::error::{Error, explain};
+use super::program;
 
 /// Work-items of a group. Always the same, as some compilers make a kernel anew for each number.
 const GROUP: usize = 64;
@@ -48,6 +49,15 @@ pub(super) struct Memory<T> {
     values: PhantomData<T>,
 }
 
+/// What the kernels do with memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// They read it.
+    Input,
+    /// They write it.
+    Output,
+}
+
 /// An argument of a kernel.
 pub(super) enum Argument<'a> {
     Memory(cl_mem, PhantomData<&'a ()>),
@@ -56,7 +66,7 @@ pub(super) enum Argument<'a> {
     F32(f32),
 }
 
-impl<T: Copy> Memory<T> {
+impl<T> Memory<T> {
     /// As an argument, for as long as it is borrowed.
     pub fn argument(&self) -> Argument<'_> {
         Argument::Memory(self.buffer.get(), PhantomData)
@@ -106,7 +116,7 @@ impl Device {
             first_hit: kernel("first_hit")?,
         };
         let expected = program::expected_layout();
-        let sizes = self.empty::<u32>(expected.len(), "sizes")?;
+        let sizes = self.output::<u32>(expected.len(), "sizes of structs")?;
         self.launch(&kernels.layout, &[sizes.argument()], 1)?;
         let mut found = vec![0; expected.len()];
         self.read(&sizes, &mut found)?;
@@ -116,39 +126,45 @@ impl Device {
         Ok(kernels)
     }
 
+    /// Memory for so many results of a kernel, at least one.
+    pub fn output<T: Pod>(&self, room: usize, what: &'static str) -> Result<Memory<T>, Error> {
+        self.allocate(room, Role::Output, what)
+    }
+
+    /// Memory that holds these values for kernels to read.
+    pub fn input<T: Pod>(&self, values: &[T], what: &'static str) -> Result<Memory<T>, Error> {
+        let mut memory = self.allocate(values.len(), Role::Input, what)?;
+        self.write(&mut memory, values)?;
+        Ok(memory)
+    }
+
     /// Memory with room for so many values, at least one.
-    pub fn empty<T: Copy>(&self, room: usize, what: &'static str) -> Result<Memory<T>, Error> {
+    fn allocate<T: Pod>(&self, room: usize, role: Role, what: &'static str) -> Result<Memory<T>, Error> {
         let bytes = room.max(1) * size_of::<T>();
         if self.info.largest > 0 && bytes as u64 > self.info.largest {
             let (needed, limit) = (bytes as u64, self.info.largest);
             return Err(Error::TooLarge { device: self.info.label(), what, needed, limit });
         }
-        let flags = if what == "results" { CL_MEM_WRITE_ONLY } else { CL_MEM_READ_ONLY };
-        let flags = if what == "sizes" { CL_MEM_WRITE_ONLY } else { flags };
+        let flags = match role {
+            Role::Input => CL_MEM_READ_ONLY,
+            Role::Output => CL_MEM_WRITE_ONLY,
+        };
         // SAFETY: no host memory is handed over.
         let buffer = unsafe { Buffer::<u8>::create(&self.context, flags, bytes, ptr::null_mut::<c_void>()) };
         let buffer = buffer.map_err(self.failed("asking for memory"))?;
         Ok(Memory { buffer, room: room.max(1), values: PhantomData })
     }
 
-    /// Memory that holds these values.
-    pub fn filled<T: Copy>(&self, values: &[T], what: &'static str) -> Result<Memory<T>, Error> {
-        let mut memory = self.empty(values.len(), what)?;
-        self.write(&mut memory, values)?;
-        Ok(memory)
-    }
-
     /// Writes values to the beginning of the memory.
     ///
     /// # Panics
     /// If it has no room for them.
-    pub fn write<T: Copy>(&self, memory: &mut Memory<T>, values: &[T]) -> Result<(), Error> {
+    fn write<T: Pod>(&self, memory: &mut Memory<T>, values: &[T]) -> Result<(), Error> {
         assert!(values.len() <= memory.room);
         if values.is_empty() {
             return Ok(());
         }
-        // SAFETY: plain numbers without padding, read as bytes.
-        let bytes = unsafe { std::slice::from_raw_parts(values.as_ptr().cast::<u8>(), size_of_val(values)) };
+        let bytes = bytemuck::cast_slice(values);
         // SAFETY: the call waits until the bytes are read, and there is room for them.
         let done = unsafe { self.queue.enqueue_write_buffer(&mut memory.buffer, CL_TRUE, 0, bytes, &[]) };
         done.map(|_| ()).map_err(self.failed("writing to its memory"))
@@ -158,13 +174,12 @@ impl Device {
     ///
     /// # Panics
     /// If it has fewer.
-    pub fn read<T: Copy>(&self, memory: &Memory<T>, values: &mut [T]) -> Result<(), Error> {
+    pub fn read<T: Pod>(&self, memory: &Memory<T>, values: &mut [T]) -> Result<(), Error> {
         assert!(values.len() <= memory.room);
         if values.is_empty() {
             return Ok(());
         }
-        // SAFETY: plain numbers, of which any bits are one.
-        let bytes = unsafe { std::slice::from_raw_parts_mut(values.as_mut_ptr().cast::<u8>(), size_of_val(values)) };
+        let bytes = bytemuck::cast_slice_mut(values);
         // SAFETY: the call waits until the bytes are written, and there are as many.
         let done = unsafe { self.queue.enqueue_read_buffer(&memory.buffer, CL_TRUE, 0, bytes, &[]) };
         done.map(|_| ()).map_err(self.failed("reading from its memory"))
@@ -195,15 +210,10 @@ impl Device {
     }
 }
 
-/// The structs of [`layout`] are plain numbers without padding.
-const _: () = {
-    assert!(size_of::<layout::Node>() == 48 && size_of::<layout::Site>() == 80 && size_of::<layout::Fold>() == 80);
-};
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::occlusion::opencl::devices::choose;
+    use crate::trace::opencl::devices::choose;
 
     /// A device whose answers can be made up.
     fn open() -> Device {
@@ -229,11 +239,11 @@ mod tests {
     fn what_does_not_fit_is_told() {
         let mut device = open();
         let room = device.info.largest as usize / 4 + 1;
-        let error = device.empty::<f32>(room, "the corners of the simplices").unwrap_err();
+        let error = device.output::<f32>(room, "the corners of the simplices").unwrap_err();
         assert!(matches!(error, Error::TooLarge { .. }) && error.to_string().contains("the corners"), "{error}");
         // A device that says it takes anything, and doesn't.
         device.info.largest = 0;
-        let error = device.empty::<f32>(1 << 50, "results").unwrap_err().to_string();
+        let error = device.output::<f32>(1 << 50, "results").unwrap_err().to_string();
         assert!(error.starts_with(&device.info.label()) && error.contains("asking for memory failed"), "{error}");
     }
 }
