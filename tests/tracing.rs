@@ -257,12 +257,14 @@ fn slabs<const D: usize>() {
     let camera = Camera::new(&view).unwrap();
     let dimensions = [9, 7, if D == 4 { 8 } else { 1 }];
     let count = mesh.vertices.len();
-    let estimates =
-        Estimates { values: (0..count).map(|i| (i % 10) as f32 / 10.0).collect(), errors: vec![0.01; count], rays: 0 };
+    let values = (0..count).map(|i| (i % 10) as f32 / 10.0).collect();
+    let estimates = Arc::new(Estimates { values, errors: vec![0.01; count], rays: 0 });
     let sobol = Estimator::Sampled(Sampling::new(16, 1));
-    for shading in [Shading::Flat(&estimates), Shading::Smooth(&estimates), Shading::Voxel(sobol)] {
+    for shading in
+        [Shading::Flat(Arc::clone(&estimates)), Shading::Smooth(Arc::clone(&estimates)), Shading::Voxel(sobol)]
+    {
         for supersample in [1, 2, 3] {
-            let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading);
+            let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading.clone());
             renderer.supersample = supersample;
             let whole = renderer.volume(Aov::ALL, &Silent).unwrap().arrays;
             for (thickness, threads) in [(1, 1), (2, 3), (7, 2), (100, 1)] {
@@ -302,10 +304,11 @@ fn means<const D: usize>(supersample: usize) {
     let dimensions = if D == 4 { [9, 8, 7] } else { [30, 25, 1] };
     let count = mesh.vertices.len();
     let values = (0..count).map(|i| (i % 10) as f32 / 10.0).collect();
-    let estimates = Estimates { values, errors: vec![0.0; count], rays: 0 };
+    let estimates = Arc::new(Estimates { values, errors: vec![0.0; count], rays: 0 });
     let fine_dimensions: [usize; 3] = std::array::from_fn(|a| dimensions[a] * if a < D - 1 { supersample } else { 1 });
-    let fine = Renderer::new(Arc::clone(&backend), camera.clone(), fine_dimensions, Shading::Smooth(&estimates));
-    let mut coarse = Renderer::new(Arc::clone(&backend), camera, dimensions, Shading::Smooth(&estimates));
+    let fine =
+        Renderer::new(Arc::clone(&backend), camera.clone(), fine_dimensions, Shading::Smooth(Arc::clone(&estimates)));
+    let mut coarse = Renderer::new(Arc::clone(&backend), camera, dimensions, Shading::Smooth(Arc::clone(&estimates)));
     coarse.supersample = supersample;
     let aovs = [Aov::Opacity, Aov::AmbientOcclusion, Aov::Rgb];
     let [fine_arrays, coarse_arrays] = [&fine, &coarse].map(|r| r.volume(&aovs, &Silent).unwrap().arrays);

@@ -99,7 +99,7 @@ fn main() {
                     }
                     let count = mesh.vertices.len();
                     let estimates = Estimates { values: vec![0.5; count], errors: vec![0.0; count], rays: 0 };
-                    let shading = Shading::Smooth(&estimates);
+                    let shading = Shading::Smooth(Arc::new(estimates));
                     let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), grid.dimensions, shading);
                     let aovs = [Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity];
                     for supersample in [1, 2, 3] {

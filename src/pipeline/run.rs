@@ -159,7 +159,7 @@ struct Scene<'p, const D: usize> {
     tracer: Arc<Tracer<D>>,
     opencl: Option<&'p OpenCl>,
     backend: OnceCell<Arc<dyn RayBackend<D>>>,
-    values: BTreeMap<usize, Estimates>,
+    values: BTreeMap<usize, Arc<Estimates>>,
 }
 
 impl<const D: usize> Scene<'_, D> {
@@ -312,7 +312,7 @@ impl Run<'_> {
                 }
             }
         };
-        scene.values.insert(index, values);
+        scene.values.insert(index, Arc::new(values));
         Ok(())
     }
 
@@ -419,7 +419,7 @@ impl Run<'_> {
             self.values(o, scene)?;
         }
         let camera = camera::<D>(&render.camera)?;
-        let values = render.occlusion.map(|o| &scene.values[&o]);
+        let values = render.occlusion.map(|o| &*scene.values[&o]);
         let (bytes, left_out) = files::write_mesh(&plan.out.join(file), &scene.mesh, &camera, values)?;
         if left_out > 0 {
             self.report.notes.push(format!(
@@ -452,11 +452,11 @@ fn rate(found: &Estimates, time: Duration) -> String {
 /// The working set of a slab: so little that memory is used again for the next, not asked for anew.
 const SLAB_BYTES: usize = 16 << 20;
 
-fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Estimates>) -> Shading<'v> {
+fn shading(plan: &Plan, render: &RenderPlan, values: &BTreeMap<usize, Arc<Estimates>>) -> Shading {
     let Some(o) = render.occlusion else { return Shading::None };
     match (render.shading, &plan.occlusions[o].source) {
         (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(estimator(computation)),
-        (spec::Shading::Flat, _) => Shading::Flat(&values[&o]),
-        _ => Shading::Smooth(&values[&o]),
+        (spec::Shading::Flat, _) => Shading::Flat(Arc::clone(&values[&o])),
+        _ => Shading::Smooth(Arc::clone(&values[&o])),
     }
 }

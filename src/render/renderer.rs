@@ -19,7 +19,7 @@ const SLAB_BYTES: usize = 16 << 20;
 
 /// Everything that decides what a picture shows.
 #[derive(Debug)]
-pub struct Renderer<'s, const D: usize> {
+pub struct Renderer<const D: usize> {
     /// What traces rays through the scene.
     pub backend: Arc<dyn RayBackend<D>>,
     /// Who looks.
@@ -27,7 +27,7 @@ pub struct Renderer<'s, const D: usize> {
     /// The voxels.
     pub grid: Grid,
     /// Where their ambient occlusion comes from.
-    pub shading: Shading<'s>,
+    pub shading: Shading,
     /// How it is found out what voxels see; changes the time only.
     pub visibility: visibility::Method,
     /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
@@ -47,14 +47,9 @@ pub struct Slab {
     pub seen: u64,
 }
 
-impl<'s, const D: usize> Renderer<'s, D> {
+impl<const D: usize> Renderer<D> {
     /// A picture with one sample a voxel and no filter.
-    pub fn new(
-        backend: Arc<dyn RayBackend<D>>,
-        camera: Camera<D>,
-        dimensions: [usize; 3],
-        shading: Shading<'s>,
-    ) -> Self {
+    pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
         Self { backend, camera, grid, shading, visibility, supersample: 1, filters: Vec::new() }

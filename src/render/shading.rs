@@ -1,16 +1,18 @@
 //! Where the ambient occlusion of a visible point comes from.
 
+use std::sync::Arc;
+
 use crate::occlusion::{Estimates, Estimator};
 
 /// Where the ambient occlusion of a visible point comes from.
-#[derive(Clone, Copy, Debug)]
-pub enum Shading<'s> {
+#[derive(Clone, Debug)]
+pub enum Shading {
     /// Nowhere: everything is open.
     None,
     /// The mean of the simplex's vertices' values (Djami 2021, 4.6.3).
-    Flat(&'s Estimates),
+    Flat(Arc<Estimates>),
     /// Interpolated between the simplex's vertices' values, by barycentric coordinates.
-    Smooth(&'s Estimates),
+    Smooth(Arc<Estimates>),
     /// Computed at the point itself, on the side that faces the ray: the reference for the other two.
     Voxel(Estimator),
 }

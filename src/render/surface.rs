@@ -25,7 +25,7 @@ pub(super) struct SurfacePass<'r, const D: usize> {
     pub camera: &'r Camera<D>,
     pub sampling: &'r Sampling,
     pub visibility: &'r Visibility<D>,
-    pub shading: &'r Shading<'r>,
+    pub shading: &'r Shading,
 }
 
 /// Where a ray meets a simplex.

@@ -107,8 +107,8 @@ pub fn measure<const D: usize>(
     for shading in ["flat", "smooth"] {
         for samples in vertex_samples {
             let (arrays, seconds) = timed(|| {
-                let values = by_rays(samples).estimate(&*backend, &points, None, &watch)?;
-                image(if shading == "flat" { Shading::Flat(&values) } else { Shading::Smooth(&values) })
+                let values = Arc::new(by_rays(samples).estimate(&*backend, &points, None, &watch)?);
+                image(if shading == "flat" { Shading::Flat(values) } else { Shading::Smooth(values) })
             })?;
             add(shading, samples, seconds, &arrays);
         }

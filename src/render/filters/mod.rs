@@ -7,8 +7,14 @@
 //!
 //! A new filter is one file here, and one line in [`Renderer::filters`](super::Renderer).
 
+mod denoise;
+mod dilate;
+
 use std::fmt;
 use std::ops::Range;
+
+pub use denoise::Denoise;
+pub use dilate::Dilate;
 
 use super::gbuffer::{Columns, GBuffer};
 use crate::occlusion::Error;
