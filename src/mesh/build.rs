@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::{Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding};
 use crate::geometry::{Vector, is_degenerate, narrow};
+use crate::progress::{Progress, Silent};
 
 /// Largest magnitude of a coordinate: determinants of four of them, and their squares, stay far from overflow.
 const LARGEST: f64 = 1e30;
@@ -75,7 +76,15 @@ impl<const D: usize> MeshBuilder<D> {
 
     /// The finished mesh.
     pub fn finish(self) -> Mesh<D> {
+        self.finish_watched(&Silent).unwrap_or_default()
+    }
+
+    /// The same; `None` soon after `progress` says to stop.
+    pub fn finish_watched(self, progress: &dyn Progress) -> Option<Mesh<D>> {
         let mut mesh = self.mesh;
+        if progress.cancelled() {
+            return None;
+        }
         mesh.identity = identity::identities(&mesh.vertices);
         mesh.normals = vec![Vector::zeros(); mesh.vertices.len()];
         mesh.degenerate =
@@ -83,6 +92,9 @@ impl<const D: usize> MeshBuilder<D> {
         for (i, (open, given)) in self.orientations.into_iter().zip(self.given_normals).enumerate() {
             let (vertices, simplices) = (mesh.objects[i].vertices.clone(), mesh.objects[i].simplices.clone());
             let open = open.unwrap_or(Orientation::Input);
+            if progress.cancelled() {
+                return None;
+            }
             let (components, closed) = orientation::orient(&mut mesh, simplices.clone(), &open);
             (mesh.objects[i].components, mesh.objects[i].closed_components) = (components, closed);
             normals::set_vertex_normals(&mut mesh, vertices.clone(), simplices);
@@ -90,6 +102,6 @@ impl<const D: usize> MeshBuilder<D> {
                 mesh.normals[vertices].copy_from_slice(&given);
             }
         }
-        mesh
+        Some(mesh)
     }
 }

@@ -22,6 +22,7 @@ pub mod orientation;
 pub mod rounding;
 mod surface;
 pub mod topology;
+pub mod weld;
 
 use std::ops::Range;
 

@@ -4,8 +4,9 @@ use super::Invalid;
 use super::plan::{CameraPlan, Plan, ProjectionPlan, SceneCounts, ScenePlan};
 use crate::geometry::Vector64;
 use crate::mesh::{Mesh, MeshBuilder, Orientation};
+use crate::progress::Progress;
 use crate::render::{Camera, Projection, View};
-use crate::scene::{self, build_object_with_notes};
+use crate::scene::{self, build_object_watched};
 
 /// A mesh of either dimension.
 #[derive(Clone, Debug)]
@@ -20,11 +21,11 @@ impl AnyMesh {
     /// Builds a scene of the plan. What is worth telling of its objects goes into `notes`.
     ///
     /// # Errors
-    /// Whatever is wrong with an object, at the key to blame.
-    pub fn build(plan: &Plan, scene: usize, notes: &mut Vec<String>) -> Result<Self, Invalid> {
+    /// Whatever is wrong with an object, at the key to blame; anything if `progress` says to stop.
+    pub fn build(plan: &Plan, scene: usize, notes: &mut Vec<String>, progress: &dyn Progress) -> Result<Self, Invalid> {
         match plan.scenes[scene].dimension {
-            3 => build(plan, scene, notes).map(Self::Three),
-            _ => build(plan, scene, notes).map(Self::Four),
+            3 => build(plan, scene, notes, progress).map(Self::Three),
+            _ => build(plan, scene, notes, progress).map(Self::Four),
         }
     }
 
@@ -57,7 +58,12 @@ pub fn camera<const D: usize>(plan: &CameraPlan) -> Result<Camera<D>, crate::ren
 }
 
 /// Builds a scene: each object's surface, one after the other, into one mesh.
-pub fn build<const D: usize>(plan: &Plan, scene: usize, notes: &mut Vec<String>) -> Result<Mesh<D>, Invalid> {
+pub fn build<const D: usize>(
+    plan: &Plan,
+    scene: usize,
+    notes: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Mesh<D>, Invalid> {
     let ScenePlan { path, objects, id, .. } = &plan.scenes[scene];
     let mut builder = MeshBuilder::<D>::new();
     for (i, object) in objects.iter().enumerate() {
@@ -72,7 +78,7 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize, notes: &mut Vec<String>)
         };
         let name = object.name.clone().unwrap_or_else(|| format!("object {}", i + 1));
         let mut told = Vec::new();
-        let surface = build_object_with_notes::<D>(object, &plan.folder, &mut told).map_err(blame)?;
+        let surface = build_object_watched::<D>(object, &plan.folder, &mut told, progress).map_err(blame)?;
         notes.extend(told.into_iter().map(|note| format!("scene {id}, {name}: {note}")));
         let open = match object.orientation {
             scene::Orientation::Input => Orientation::Input,
@@ -90,5 +96,5 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize, notes: &mut Vec<String>)
         let color = object.color.rgb().map_err(blame)?;
         builder.add(&name, color, &surface, open).map_err(|e| refuse("", e.to_string()))?;
     }
-    Ok(builder.finish())
+    builder.finish_watched(progress).ok_or_else(|| Invalid::new(path.clone(), "stopped"))
 }

@@ -6,8 +6,8 @@ use super::RunError;
 use super::plan::{Plan, RenderPlan, WritePlan};
 use super::spec::{Compression, Encoding};
 use super::work::Stale;
-use crate::export;
-use crate::render::{Channel, Fragment};
+use crate::io;
+use crate::render::{Aov as Channel, Columns};
 use crate::volume::available_memory;
 
 /// Refuses a run whose files don't fit on the disk, or one layer of whose pictures doesn't fit in memory.
@@ -22,7 +22,7 @@ pub(super) fn check(plan: &Plan, stale: &Stale) -> Result<(), RunError> {
         return Err(RunError::Memory { render: plan.renders[render].id.clone(), needed, available });
     }
     let disk = (0..plan.writes.len()).map(|write| disk(plan, stale, write)).fold(0, u64::saturating_add);
-    export::check_free_space(&plan.out, disk)?;
+    io::check_free_space(&plan.out, disk)?;
     Ok(())
 }
 
@@ -39,9 +39,9 @@ fn layer_memory(plan: &Plan, stale: &Stale, index: usize) -> u64 {
     if channels.is_empty() {
         return 0;
     }
-    channels.insert(Channel::Opacity); // counts what is seen
     let arrays: u64 = channels.iter().map(|&channel| bytes(plan, render, channel)).sum();
-    let voxel = size_of::<u32>() as u64 + size_of::<Fragment>() as u64 + arrays;
+    let columns = channels.iter().fold(Columns::SIMPLEX, |all, channel| all | channel.columns());
+    let voxel = size_of::<u32>() as u64 + columns.bytes::<4>() as u64 + arrays;
     (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel)
 }
 

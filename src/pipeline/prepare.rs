@@ -7,6 +7,7 @@ use super::build::AnyMesh;
 use super::plan::{OcclusionSource, Plan, SceneCounts};
 use super::{Error, Invalid, Pipeline};
 use crate::occlusion::{self, Sidecar};
+use crate::progress::{Progress, Silent};
 
 /// A pipeline's inputs, read and checked.
 #[derive(Clone, Debug)]
@@ -44,14 +45,22 @@ impl Pipeline {
     /// # Errors
     /// Whatever is wrong with an object or a file, with the line that asked for it.
     pub fn prepare(&self, wanted: impl Fn(usize) -> bool) -> Result<Prepared, Error> {
-        prepare(&self.plan, wanted).map_err(|invalid| self.document.refuse(invalid))
+        self.prepare_watched(wanted, &Silent)
+    }
+
+    /// The same, and ends soon after `progress` says to stop; what it returns then is of no use.
+    ///
+    /// # Errors
+    /// As [`Pipeline::prepare`].
+    pub fn prepare_watched(&self, wanted: impl Fn(usize) -> bool, progress: &dyn Progress) -> Result<Prepared, Error> {
+        prepare(&self.plan, wanted, progress).map_err(|invalid| self.document.refuse(invalid))
     }
 }
 
-fn prepare(plan: &Plan, wanted: impl Fn(usize) -> bool) -> Result<Prepared, Invalid> {
+fn prepare(plan: &Plan, wanted: impl Fn(usize) -> bool, progress: &dyn Progress) -> Result<Prepared, Invalid> {
     let (mut meshes, mut notes) = (Vec::with_capacity(plan.scenes.len()), Vec::new());
     for scene in 0..plan.scenes.len() {
-        meshes.push(if wanted(scene) { Some(AnyMesh::build(plan, scene, &mut notes)?) } else { None });
+        meshes.push(if wanted(scene) { Some(AnyMesh::build(plan, scene, &mut notes, progress)?) } else { None });
     }
     let mut loaded = Vec::with_capacity(plan.occlusions.len());
     for occlusion in &plan.occlusions {

@@ -20,6 +20,7 @@ use super::transform::{self, TransformStep};
 use super::{Error, file};
 use crate::mesh::Surface;
 use crate::mesh::rounding::turned_over;
+use crate::progress::{Progress, Silent};
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -175,11 +176,16 @@ impl Shape<'_> {
     }
 
     /// The surface, before it is placed.
-    fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
+    fn build<const D: usize>(
+        &self,
+        folder: &Path,
+        notes: &mut Vec<String>,
+        progress: &dyn Progress,
+    ) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
-            Shape::File(path) => file::build(path, folder),
-            Shape::Extrude(spec) => spec.build(folder),
+            Shape::File(path) => Ok(file::build(path, folder)?),
+            Shape::Extrude(spec) => spec.build(folder, progress),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),
             Shape::Tesseract(spec) => spec.build(),
@@ -188,7 +194,7 @@ impl Shape<'_> {
                 Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
             }
             Shape::Sphere(spec) => spec.build("sphere"),
-            Shape::Isosurface(spec) => spec.build(folder, notes),
+            Shape::Isosurface(spec) => spec.build(folder, notes, progress),
             Shape::Spin(spec) => spec.build(folder),
             Shape::Polytope(spec) => spec.build(),
             Shape::Duoprism(spec) => spec.build(),
@@ -246,9 +252,19 @@ pub fn build_object_with_notes<const D: usize>(
     folder: &Path,
     notes: &mut Vec<String>,
 ) -> Result<Surface<D>, Error> {
+    build_object_watched(spec, folder, notes, &Silent)
+}
+
+/// The same, stopped with [`Error::Cancelled`] soon after `progress` says so.
+pub fn build_object_watched<const D: usize>(
+    spec: &ObjectSpec,
+    folder: &Path,
+    notes: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Surface<D>, Error> {
     let shape = spec.shape()?;
     spec.color.rgb()?;
-    let mut surface = shape.build::<D>(folder, notes)?;
+    let mut surface = shape.build::<D>(folder, notes, progress)?;
     let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;
     // Coordinates are rounded to single precision afterwards and must survive that.

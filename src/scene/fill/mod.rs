@@ -29,27 +29,47 @@ use self::kernel::{Deepest, Plane, deepest};
 use crate::geometry::Vector64;
 use crate::mesh::topology::{corners, enclosed_volume, facet_pairs, sort_with_parity};
 use crate::mesh::{MeshBuilder, Orientation, Surface};
+use crate::progress::Progress;
 
 /// The least height of an apex over its base, and the narrowest gap to cut in, in terms of the solid's size: some steps of
 /// single precision.
 const LEAST: f64 = 1e-6;
 
+/// Why there is no solid.
+#[derive(Debug)]
+pub enum Unfilled {
+    /// Whoever watches wants no more of it.
+    Cancelled,
+    /// What is wrong with the surface, and what to do about it.
+    Refused(String),
+}
+
+impl From<String> for Unfilled {
+    fn from(message: String) -> Self {
+        Self::Refused(message)
+    }
+}
+
 /// The points and the positively oriented tetrahedra of the solid within these triangles. Points with identical coordinates
 /// must be one point. Triangles that face the wrong way are turned.
 ///
 /// # Errors
-/// If the surface is open or passes through itself.
-pub fn fill(points: &[Vector64<3>], triangles: &[[u32; 3]]) -> Result<(Vec<Vector64<3>>, Vec<[u32; 4]>), String> {
+/// If the surface is open or passes through itself, or `progress` says to stop.
+pub fn fill(
+    points: &[Vector64<3>],
+    triangles: &[[u32; 3]],
+    progress: &dyn Progress,
+) -> Result<(Vec<Vector64<3>>, Vec<[u32; 4]>), Unfilled> {
     let nothing = || "encloses nothing: all its triangles are flat or cancel".to_owned();
     let triangles = without_pairs(triangles);
     if triangles.is_empty() {
-        return Err(nothing());
+        return Err(nothing().into());
     }
     let frame = Frame::of(points, &triangles);
     let near: Vec<Vector64<3>> = points.iter().map(|point| frame.inwards(point)).collect();
     let triangles = outward(&near, triangles)?;
     if enclosed_volume(corners(&near, &triangles)) < LEAST * LEAST {
-        return Err(nothing());
+        return Err(nothing().into());
     }
     let (mut complex, whole) = Complex::new(near, &triangles);
     let own = points.len() as u32;
@@ -65,6 +85,9 @@ pub fn fill(points: &[Vector64<3>], triangles: &[[u32; 3]]) -> Result<(Vec<Vecto
     while let Some((cell, cuts)) = open.pop() {
         let cell = complex.resolve(&cell);
         for part in cells::parts(&complex, cell) {
+            if progress.cancelled() {
+                return Err(Unfilled::Cancelled);
+            }
             let corners = corners_of(&complex, &part);
             if let Some(apex) = apex(&complex, &part, &corners, own, cuts) {
                 leaves.push((part, apex));
@@ -81,14 +104,14 @@ pub fn fill(points: &[Vector64<3>], triangles: &[[u32; 3]]) -> Result<(Vec<Vecto
                     Err(near) => trouble = near,
                 }
             }
-            let Some([below, above]) = halves else { return Err(crossed(trouble)) };
+            let Some([below, above]) = halves else { return Err(crossed(trouble).into()) };
             open.push((above, cuts + 1));
             open.push((below, cuts + 1));
         }
     }
     let tetrahedra = tetrahedra(&mut complex, leaves).map_err(crossed)?;
     if tetrahedra.is_empty() {
-        return Err(nothing());
+        return Err(nothing().into());
     }
     let (used, tetrahedra) = super::lattice::compact(tetrahedra);
     let points = used.into_iter().map(|i| match points.get(i as usize) {

@@ -1,0 +1,346 @@
+//! How far two images, meshes or lists of numbers are apart: the regression comparison.
+//!
+//! Two numbers agree if `|a - b| <= atol + rtol |b|`, the rule of numpy's `allclose`, with b the reference. Equal
+//! infinities agree, and so do two NaNs; a NaN or an infinity against anything else differs, and counts as
+//! incomparable because no difference can be told. Integers are subtracted as integers, so that 64-bit ones do not
+//! round. Whatever exists on one side only is a difference too, as is another grid or other cells. Field data is not
+//! compared: it says how a file was made, not what it shows.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::io::vtk::{DataSet, Image, UnstructuredGrid};
+use crate::volume::{Array, Grid, Values, Volume};
+
+/// What still counts as the same.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tolerance {
+    /// Absolute tolerance.
+    pub atol: f64,
+    /// Relative tolerance, times the reference's magnitude.
+    pub rtol: f64,
+    /// How many numbers of an array may differ all the same.
+    pub max_different: usize,
+    /// Only these arrays are compared; all of them if there are none. One that neither side has is a difference.
+    pub arrays: Vec<String>,
+}
+
+/// The outcome of a comparison.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Whether the two count as the same.
+    pub same: bool,
+    /// What differs beside numbers: the grid, arrays on one side only, other types.
+    pub differences: Vec<String>,
+    /// The arrays that both sides have, in the first one's order.
+    pub arrays: Vec<ArrayComparison>,
+}
+
+/// How far two arrays of one name are apart.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArrayComparison {
+    /// The array's name.
+    pub name: String,
+    /// Numbers compared.
+    pub count: usize,
+    /// Numbers beyond tolerance.
+    pub different: usize,
+    /// Of these, the ones with a NaN or an infinity on one side.
+    pub incomparable: usize,
+    /// The largest difference between comparable numbers.
+    pub largest: f64,
+    /// The root of the mean square of all comparable differences.
+    pub rms: f64,
+    /// Where the first incomparable number is, or else the largest difference; none if there is no difference at all.
+    pub at: Option<Place>,
+    /// Whether no more numbers differ than may.
+    pub same: bool,
+}
+
+/// A number in an array.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Place {
+    /// The tuple's index: the point's or the cell's.
+    pub index: usize,
+    /// The voxel (i, j, k), in an image.
+    pub voxel: Option<[usize; 3]>,
+    /// The component.
+    pub component: usize,
+    /// The number on the first side, as text.
+    pub a: String,
+    /// The number on the second side, as text.
+    pub b: String,
+}
+
+/// Compares two data sets read from files.
+pub fn data_sets(a: &DataSet, b: &DataSet, tolerance: &Tolerance) -> Comparison {
+    match (a, b) {
+        (DataSet::Image(a), DataSet::Image(b)) => images(a, b, tolerance),
+        (DataSet::Unstructured(a), DataSet::Unstructured(b)) => meshes(a, b, tolerance),
+        (DataSet::Image(_), _) => of_other_kind("an image", "a mesh"),
+        (DataSet::Unstructured(_), _) => of_other_kind("a mesh", "an image"),
+    }
+}
+
+/// The comparison of two things that have nothing in common.
+pub fn of_other_kind(a: &str, b: &str) -> Comparison {
+    Comparison { differences: vec![format!("the first is {a}, the second {b}")], ..Comparison::default() }
+}
+
+/// Compares two images: grid, arrays on points and on cells.
+pub fn images(a: &Image, b: &Image, tolerance: &Tolerance) -> Comparison {
+    let mut comparison = Comparison::default();
+    comparison.grids(&a.grid, &b.grid, tolerance);
+    if a.direction != b.direction {
+        comparison.differences.push(format!("direction {:?} and {:?}", a.direction, b.direction));
+    }
+    let grid = (a.grid.dimensions == b.grid.dimensions).then_some(&a.grid);
+    comparison.lists("", &a.point_arrays, &b.point_arrays, grid, tolerance);
+    comparison.lists("cell ", &a.cell_arrays, &b.cell_arrays, None, tolerance);
+    comparison.finish(tolerance)
+}
+
+/// Compares two images in memory.
+pub fn volumes(a: &Volume, b: &Volume, tolerance: &Tolerance) -> Comparison {
+    images(&a.clone().into(), &b.clone().into(), tolerance)
+}
+
+/// Compares two meshes: points, cells, arrays on both.
+pub fn meshes(a: &UnstructuredGrid, b: &UnstructuredGrid, tolerance: &Tolerance) -> Comparison {
+    let mut comparison = Comparison::default();
+    if a.points.len() != b.points.len() {
+        comparison.differences.push(format!("{} and {} points", a.points.len(), b.points.len()));
+    } else if tolerance.takes("points") {
+        let points = |g: &UnstructuredGrid| Array::new("points", 3, g.points.as_flattened().to_vec());
+        comparison.arrays.push(array(&points(a), &points(b), None, tolerance));
+    }
+    if a.types.len() != b.types.len() {
+        comparison.differences.push(format!("{} and {} cells", a.types.len(), b.types.len()));
+    } else if let Some(i) = a.cells().zip(b.cells()).position(|(a, b)| a != b) {
+        comparison.differences.push(format!("other cells, the first at index {i}"));
+    }
+    comparison.lists("", &a.point_arrays, &b.point_arrays, None, tolerance);
+    comparison.lists("cell ", &a.cell_arrays, &b.cell_arrays, None, tolerance);
+    comparison.finish(tolerance)
+}
+
+/// Compares two lists of numbers, occlusion files say, under a name for messages.
+pub fn lists(name: &str, a: &Values, b: &Values, tolerance: &Tolerance) -> Comparison {
+    let list = |values: &Values| [Array::new(name, 1, values.clone())];
+    let mut comparison = Comparison::default();
+    comparison.lists("", &list(a), &list(b), None, tolerance);
+    comparison.finish(tolerance)
+}
+
+impl Tolerance {
+    fn takes(&self, array: &str) -> bool {
+        self.arrays.is_empty() || self.arrays.iter().any(|name| name == array)
+    }
+
+    fn agree(&self, difference: f64, reference: f64) -> bool {
+        difference <= self.atol + self.rtol * reference.abs()
+    }
+}
+
+impl Comparison {
+    /// Grids must have the same dimensions; origin and spacing may differ as far as numbers may.
+    fn grids(&mut self, a: &Grid, b: &Grid, tolerance: &Tolerance) {
+        if a.dimensions != b.dimensions {
+            self.differences.push(format!("dimensions {:?} and {:?}", a.dimensions, b.dimensions));
+        }
+        for (what, a, b) in [("origin", a.origin, b.origin), ("spacing", a.spacing, b.spacing)] {
+            if a.iter().zip(&b).any(|(a, b)| !tolerance.agree((a - b).abs(), *b)) {
+                self.differences.push(format!("{what} {a:?} and {b:?}"));
+            }
+        }
+    }
+
+    /// Arrays are matched by name.
+    fn lists(&mut self, kind: &str, a: &[Array], b: &[Array], grid: Option<&Grid>, tolerance: &Tolerance) {
+        for x in a.iter().filter(|x| tolerance.takes(&x.name)) {
+            let Some(y) = b.iter().find(|y| y.name == x.name) else {
+                self.differences.push(format!("{kind}array `{}` is only in the first", x.name));
+                continue;
+            };
+            if (x.values.kind(), x.components) != (y.values.kind(), y.components) {
+                let kind_of = |a: &Array| format!("{} x {}", a.components, a.values.kind().vtk_name());
+                self.differences.push(format!("{kind}array `{}` is {} and {}", x.name, kind_of(x), kind_of(y)));
+            }
+            if x.values.len() != y.values.len() {
+                let (m, n) = (x.values.len(), y.values.len());
+                self.differences.push(format!("{kind}array `{}` has {m} and {n} numbers", x.name));
+            } else if x.components == y.components {
+                self.arrays.push(array(x, y, grid, tolerance));
+            }
+        }
+        for y in b.iter().filter(|y| tolerance.takes(&y.name) && !a.iter().any(|x| x.name == y.name)) {
+            self.differences.push(format!("{kind}array `{}` is only in the second", y.name));
+        }
+    }
+
+    fn finish(mut self, tolerance: &Tolerance) -> Self {
+        for name in &tolerance.arrays {
+            let known = self.arrays.iter().any(|a| a.name == *name)
+                || self.differences.iter().any(|d| d.contains(&format!("array `{name}`")));
+            if !known {
+                self.differences.push(format!("neither has an array `{name}`"));
+            }
+        }
+        self.same = self.differences.is_empty() && self.arrays.iter().all(|a| a.same);
+        self
+    }
+}
+
+/// Compares two arrays of equal length and equally many components; with a grid, places become voxels.
+fn array(a: &Array, b: &Array, grid: Option<&Grid>, tolerance: &Tolerance) -> ArrayComparison {
+    let count = a.values.len().min(b.values.len());
+    let (mut different, mut incomparable, mut largest, mut squares) = (0, 0, 0f64, 0f64);
+    let (mut first_incomparable, mut largest_at) = (None, None);
+    for i in 0..count {
+        let (x, y) = (a.values.get(i), b.values.get(i));
+        let difference = match (a.values.integer(i), b.values.integer(i)) {
+            (Some(x), Some(y)) => (x - y).abs() as f64,
+            _ if x == y || (x.is_nan() && y.is_nan()) => 0.0,
+            _ if !x.is_finite() || !y.is_finite() => {
+                (different, incomparable) = (different + 1, incomparable + 1);
+                first_incomparable.get_or_insert(i);
+                continue;
+            }
+            _ => (x - y).abs(),
+        };
+        if difference == 0.0 {
+            continue;
+        }
+        different += usize::from(!tolerance.agree(difference, y));
+        squares += difference * difference;
+        if difference > largest {
+            (largest, largest_at) = (difference, Some(i));
+        }
+    }
+    let comparable = count - incomparable;
+    let place = |i: usize| {
+        let (index, component) = (i / a.components.max(1), i % a.components.max(1));
+        let voxel = grid.map(|g| g.index(index));
+        Place { index, voxel, component, a: a.values.format(i), b: b.values.format(i) }
+    };
+    ArrayComparison {
+        name: a.name.clone(),
+        count,
+        different,
+        incomparable,
+        largest,
+        rms: if comparable == 0 { 0.0 } else { (squares / comparable as f64).sqrt() },
+        at: first_incomparable.or(largest_at).map(place),
+        same: different <= tolerance.max_different,
+    }
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for difference in &self.differences {
+            writeln!(f, "different: {difference}")?;
+        }
+        for array in &self.arrays {
+            writeln!(f, "{array}")?;
+        }
+        f.write_str(if self.same { "same" } else { "different" })
+    }
+}
+
+impl fmt::Display for ArrayComparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, count, different, incomparable, largest, rms, at, same } = self;
+        write!(f, "{}: {name}: ", if *same { "same" } else { "different" })?;
+        let Some(at) = at else { return write!(f, "{count} numbers, all equal") };
+        write!(f, "{different} of {count} numbers differ, largest {largest:.3e}, rms {rms:.3e}")?;
+        if *incomparable > 0 {
+            write!(f, ", {incomparable} with NaN or infinity on one side")?;
+        }
+        write!(f, "; {} and {} at {}", at.a, at.b, at.index)?;
+        if let Some([i, j, k]) = at.voxel {
+            write!(f, " (voxel {i}, {j}, {k})")?;
+        }
+        if at.component > 0 { write!(f, ", component {}", at.component) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn volume(values: Vec<f32>) -> Volume {
+        let grid = Grid { dimensions: [2, 3, 1], origin: [0.0; 3], spacing: [1.0; 3] };
+        Volume { grid, arrays: vec![Array::new("a", 1, values)], field_data: Vec::new() }
+    }
+
+    fn zeros_with(i: usize, x: f32) -> Volume {
+        let mut values = vec![0.0; 6];
+        values[i] = x;
+        volume(values)
+    }
+
+    #[test]
+    fn a_difference_is_found_and_placed() {
+        let c = volumes(&zeros_with(3, 0.5), &zeros_with(0, 0.0), &Tolerance::default());
+        assert!(!c.same);
+        let a = &c.arrays[0];
+        assert_eq!((a.different, a.largest, a.at.as_ref().unwrap().voxel), (1, 0.5, Some([1, 1, 0])));
+        assert!((a.rms - 0.5 / 6f64.sqrt()).abs() < 1e-12);
+        assert!(c.to_string().contains("0.5 and 0.0 at 3 (voxel 1, 1, 0)"), "{c}");
+        for tolerance in
+            [Tolerance { atol: 0.5, ..Default::default() }, Tolerance { max_different: 1, ..Default::default() }]
+        {
+            assert!(volumes(&zeros_with(3, 0.5), &zeros_with(0, 0.0), &tolerance).same);
+        }
+        // rtol goes by the second side: here that is zero, and there it is not.
+        let relative = Tolerance { rtol: 1.0, ..Default::default() };
+        assert!(!volumes(&zeros_with(3, 0.5), &zeros_with(0, 0.0), &relative).same);
+        assert!(volumes(&zeros_with(0, 0.0), &zeros_with(3, 0.5), &relative).same);
+    }
+
+    #[test]
+    fn nan_and_infinity() {
+        let exact = Tolerance::default();
+        let lenient = Tolerance { atol: 1e30, rtol: 1e30, ..Default::default() };
+        assert!(volumes(&zeros_with(1, f32::NAN), &zeros_with(1, -f32::NAN), &exact).same);
+        assert!(volumes(&zeros_with(1, f32::INFINITY), &zeros_with(1, f32::INFINITY), &exact).same);
+        for (x, y) in [(f32::NAN, 0.0), (0.0, f32::INFINITY), (f32::INFINITY, f32::NEG_INFINITY)] {
+            let c = volumes(&zeros_with(1, x), &zeros_with(1, y), &lenient);
+            assert!(!c.same);
+            assert_eq!((c.arrays[0].incomparable, c.arrays[0].at.as_ref().unwrap().index), (1, 1));
+            assert!(c.arrays[0].rms.is_finite());
+        }
+    }
+
+    #[test]
+    fn what_is_missing_or_of_another_kind_is_a_difference() {
+        let a = volume(vec![0.0; 6]);
+        let mut b = a.clone();
+        b.arrays.push(Array::new("b", 1, vec![0u8; 6]));
+        let all = Tolerance::default();
+        assert!(volumes(&b, &a, &all).to_string().contains("`b` is only in the first"));
+        assert!(volumes(&a, &b, &all).to_string().contains("`b` is only in the second"));
+        let only = |name: &str| Tolerance { arrays: vec![name.into()], ..Default::default() };
+        assert!(volumes(&a, &b, &only("a")).same);
+        assert!(!volumes(&a, &b, &only("b")).same);
+        assert!(volumes(&a, &b, &only("c")).to_string().contains("neither has an array `c`"));
+        let mut c = a.clone();
+        c.arrays[0].values = vec![0.0f64; 6].into();
+        assert!(volumes(&a, &c, &all).to_string().contains("1 x Float32 and 1 x Float64"));
+        let mut d = a.clone();
+        d.grid.spacing[1] = 1.25;
+        assert!(volumes(&a, &d, &all).to_string().contains("spacing"));
+        let mut e = a.clone();
+        e.grid.dimensions = [3, 2, 1];
+        assert!(!volumes(&a, &e, &all).same);
+    }
+
+    #[test]
+    fn wide_integers_do_not_round() {
+        let (a, b) = (Values::I64(vec![i64::MAX, i64::MIN]), Values::I64(vec![i64::MAX - 1, i64::MIN]));
+        let c = lists("index", &a, &b, &Tolerance::default());
+        assert_eq!((c.arrays[0].different, c.arrays[0].largest), (1, 1.0));
+        assert!(!lists("index", &a, &Values::I64(vec![0]), &Tolerance::default()).same);
+    }
+}
