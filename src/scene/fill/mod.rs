@@ -12,7 +12,12 @@
 //! apex well above it, so it withstands rounding; and tetrahedra with the right boundary that all have positive volume
 //! fill the solid, once.
 //!
-//! A surface that is open, or passes through itself, has no inside and is refused.
+//! Compared with this were: cutting along the planes of all triangles in whole numbers (exact, but 490 to 3,000 pieces a
+//! triangle on prisms whose flat faces are off by a last digit, most of them slivers), and constrained Delaunay
+//! tetrahedralisation (few pieces, but slivers between corners of a flat face, and no crate with a free licence).
+//!
+//! A surface that is open has no inside and is refused, and so is one of which a section shows that it passes through
+//! itself. Bodies that overlap, each closed, are each filled where no section has both.
 
 mod cells;
 mod complex;
