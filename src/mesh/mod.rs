@@ -13,12 +13,14 @@
 
 mod build;
 mod error;
+pub mod facets;
 pub mod identity;
 mod incidence;
 pub mod normals;
 pub mod orientation;
 mod surface;
 pub mod topology;
+mod union_find;
 
 use std::ops::Range;
 
@@ -31,6 +33,7 @@ pub use error::MeshError;
 pub use incidence::Incidence;
 pub use orientation::{Orientation, Viewpoint};
 pub use surface::Surface;
+pub use union_find::UnionFind;
 
 /// One object of a scene: which vertices and simplices of the mesh are its own, and how it looks.
 #[derive(Clone, Debug, PartialEq)]
