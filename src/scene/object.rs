@@ -11,13 +11,14 @@ use super::cut_cube::CutCubeSpec;
 use super::extrude::ExtrudeSpec;
 use super::hypersphere::SphereSpec;
 use super::isosurface::IsosurfaceSpec;
-use super::numbers::AXES;
+use super::numbers::{AXES, only_in};
 use super::polytope::PolytopeSpec;
 use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
+use crate::geometry::Dimension;
 use crate::mesh::Surface;
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
@@ -173,10 +174,10 @@ impl Shape<'_> {
             Shape::Box(spec) => spec.build(),
             Shape::Tesseract(spec) => spec.build(),
             Shape::Hypersphere(spec) => spec.build("hypersphere"),
-            Shape::Sphere(_) if D != 3 => {
-                Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
+            Shape::Sphere(spec) => {
+                only_in::<D>(Dimension::Three, "sphere", "; take a hypersphere")?;
+                spec.build("sphere")
             }
-            Shape::Sphere(spec) => spec.build("sphere"),
             Shape::Isosurface(spec) => spec.build(folder, notes),
             Shape::Spin(spec) => spec.build(folder),
             Shape::Polytope(spec) => spec.build(),

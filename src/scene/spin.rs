@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::extrude::solid;
-use super::numbers::{AXES, check_count, finite};
+use super::numbers::{AXES, check_count, finite, only_in};
 use super::product::Chain;
 use super::readers::{Cells, Input};
 use super::weld::weld;
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
 use crate::mesh::Surface;
 
 /// A mesh from a file, turned all the way round in a plane with w.
@@ -41,9 +41,7 @@ pub struct SpinSpec {
 impl SpinSpec {
     /// The surface of revolution. Refused in 3D.
     pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
-        if D != 4 {
-            return Err(Error::invalid("spin", format!("needs a scene of dimension 4, not {D}")));
-        }
+        only_in::<D>(Dimension::Four, "spin", "")?;
         let axis = match self.plane.as_deref() {
             None | Some("xw") => 0,
             Some("yw") => 1,

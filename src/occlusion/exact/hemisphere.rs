@@ -7,7 +7,7 @@ use super::plane::Plane;
 use super::polygon::{Hole, Region};
 use super::span::Span;
 use super::trace::{SimplicialCone, Trace, facet_above_horizon, trace};
-use crate::geometry::{Vector, widen};
+use crate::geometry::{Dimension, Vector, widen};
 
 /// How much work one point may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,7 +185,7 @@ impl<const D: usize> Hemisphere<D> {
             let outwards = -f64::from(facet.side) * plane.unit_normal();
             sum += outwards.dot(horizon.unit_normal()) * exposed(region, &mut holes, counter)?;
         }
-        let sphere = if D == 3 { 2.0 } else { 4.0 } * std::f64::consts::PI;
+        let sphere = Dimension::of::<D>().horizon_measure();
         Ok(sum / sphere)
     }
 
