@@ -11,7 +11,7 @@ use super::spec;
 use super::work::Stale;
 use crate::export::vti::{self, ArraySpec, VtiWriter};
 use crate::export::{self, AtomicFile, Error, png, raw::RawWriter, vtu};
-use crate::geometry::widen;
+use crate::geometry::{Dimension, widen};
 use crate::mesh::Mesh;
 use crate::occlusion::{self, Estimates, Sidecar};
 use crate::render::{Camera, Channel, Picture};
@@ -120,13 +120,16 @@ impl PictureFiles {
     }
 }
 
-fn array_spec(channel: Channel, dimension: usize) -> ArraySpec {
+fn array_spec(channel: Channel, dimension: Dimension) -> ArraySpec {
     let kind = match channel {
         Channel::Rgba => Kind::U8,
         Channel::Object => Kind::U16,
         _ => Kind::F32,
     };
-    let components = if dimension == 3 { channel.components::<3>() } else { channel.components::<4>() };
+    let components = match dimension {
+        Dimension::Three => channel.components::<3>(),
+        Dimension::Four => channel.components::<4>(),
+    };
     ArraySpec::new(channel.name(), kind, components)
 }
 
@@ -214,13 +217,14 @@ pub(super) fn write_mesh<const D: usize>(
     let mut before = vec![true; mesh.vertices.len()];
     let mut points = vec![[0.0f32; 3]; mesh.vertices.len()];
     for (i, vertex) in mesh.vertices.iter().enumerate() {
-        if D == 3 {
-            points[i] = std::array::from_fn(|a| vertex[a]);
-        } else {
-            let (image, distance) = camera.project(vertex);
-            let image = image.map(|x| x as f32);
-            before[i] = distance > 0.0 && image.iter().all(|x| x.is_finite());
-            points[i] = if before[i] { image } else { [0.0; 3] };
+        match Dimension::of::<D>() {
+            Dimension::Three => points[i] = std::array::from_fn(|a| vertex[a]),
+            Dimension::Four => {
+                let (image, distance) = camera.project(vertex);
+                let image = image.map(|x| x as f32);
+                before[i] = distance > 0.0 && image.iter().all(|x| x.is_finite());
+                points[i] = if before[i] { image } else { [0.0; 3] };
+            }
         }
     }
     let shown: Vec<usize> =
@@ -245,12 +249,15 @@ pub(super) fn write_mesh<const D: usize>(
         }
     }
     let mut file = AtomicFile::create(path)?;
-    if D == 3 {
-        let cells: Vec<[u32; 3]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
-        vtu::write(&mut file, &points, vtu::Cells::Triangles(&cells), &arrays, &[])
-    } else {
-        let cells: Vec<[u32; 4]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
-        vtu::write(&mut file, &points, vtu::Cells::Tetrahedra(&cells), &arrays, &[])
+    match Dimension::of::<D>() {
+        Dimension::Three => {
+            let cells: Vec<[u32; 3]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+            vtu::write(&mut file, &points, vtu::Cells::Triangles(&cells), &arrays, &[])
+        }
+        Dimension::Four => {
+            let cells: Vec<[u32; 4]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+            vtu::write(&mut file, &points, vtu::Cells::Tetrahedra(&cells), &arrays, &[])
+        }
     }
     .map_err(AtomicFile::name_in(path))?;
     Ok((file.commit()?, mesh.simplices.len() - shown.len()))

@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(camera.back, axis::<D>(D - 1));
         assert_eq!((camera.right, camera.up), (axis::<D>(0), axis::<D>(1)));
         let over = [axis::<D>(2), Vector64::zeros()];
-        assert_eq!(camera.over, over[usize::from(D == 3)]);
+        assert_eq!(camera.over, over[Dimension::of::<D>().pick(1, 0)]);
         // Any camera's frame is orthonormal and turns as the default one does.
         let view = View {
             eye: Vector64::from_fn(|r, _| [3.0, -1.0, 2.0, 0.5][r]),
