@@ -9,9 +9,12 @@
 //!   normals within one;
 //! - [`orientation`]: which components are closed, and which side of them is outside;
 //! - [`normals`]: measure-weighted vertex normals;
+//! - [`corners`]: where the surface creases, and vertices are split so that each side has a normal of its own;
 //! - simplices of measure zero, which no ray can hit.
 
+mod approach;
 mod build;
+pub mod corners;
 mod error;
 pub mod facets;
 pub mod identity;
@@ -28,7 +31,9 @@ use sha2::{Digest, Sha256};
 
 use crate::geometry::{Aabb, Vector};
 
+pub use approach::approach;
 pub use build::MeshBuilder;
+pub use corners::Crease;
 pub use error::MeshError;
 pub use incidence::Incidence;
 pub use orientation::{Orientation, Viewpoint};

@@ -88,7 +88,8 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize, notes: &mut Vec<String>)
             },
         };
         let color = object.color.rgb().map_err(blame)?;
-        builder.add(&name, color, &surface, open).map_err(|e| refuse("", e.to_string()))?;
+        let crease = object.crease().map_err(blame)?;
+        builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
     }
     Ok(builder.finish())
 }

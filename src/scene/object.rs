@@ -19,7 +19,8 @@ use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
 use crate::geometry::Dimension;
-use crate::mesh::Surface;
+use crate::mesh::corners::DEFAULT_ANGLE;
+use crate::mesh::{Crease, Surface};
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -83,6 +84,29 @@ pub struct ObjectSpec {
     /// Which way an open surface faces.
     #[serde(default)]
     pub orientation: Orientation,
+    /// Where the surface creases: neighbours whose normals differ by more than this, in degrees, have a shading point each
+    /// at the vertices between them. 30 if left out, or more for an isosurface that is rough all over; listed simplices
+    /// keep their vertices. `off`: one normal a vertex.
+    #[serde(default)]
+    pub crease_angle: Option<CreaseAngle>,
+}
+
+/// An angle in degrees, or `off`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected degrees from 0 to 180, or off")]
+pub enum CreaseAngle {
+    /// Degrees, from 0 to 180.
+    Degrees(f64),
+    /// No creases.
+    Off(Off),
+}
+
+/// The word `off`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Off {
+    /// It.
+    Off,
 }
 
 /// Which way an open surface faces.
@@ -222,6 +246,23 @@ impl ObjectSpec {
                  hypersphere, sphere, isosurface, spin, polytope, duoprism, duocylinder, spherinder, cubinder",
             )),
         }
+    }
+}
+
+impl ObjectSpec {
+    /// Where the object's vertices are split.
+    pub fn crease(&self) -> Result<Crease, Error> {
+        Ok(match (self.crease_angle, self.shape()?) {
+            (Some(CreaseAngle::Off(Off::Off)), _) => Crease::Never,
+            (Some(CreaseAngle::Degrees(degrees)), _) if (0.0..=180.0).contains(&degrees) => Crease::Above(degrees),
+            (Some(CreaseAngle::Degrees(degrees)), _) => {
+                let message = format!("expected degrees from 0 to 180, or off, found {degrees}");
+                return Err(Error::invalid("crease_angle", message));
+            }
+            (None, Shape::Simplices(_)) => Crease::Never,
+            (None, Shape::Isosurface(_)) => Crease::Rough,
+            (None, _) => Crease::Above(DEFAULT_ANGLE),
+        })
     }
 }
 
