@@ -2,18 +2,18 @@
 
 use crate::accel::Tracer;
 use crate::geometry::{Column, Cone, Frame, Ray, Vector, widen};
-use crate::mesh::{Incidence, Mesh};
+use crate::mesh::{Incidence, Mesh, approach};
 
-/// What a simplex with a corner at the point hides: the cone of its edges from there and -normal. None if it is wholly
-/// below the tangent hyperplane, and hides nothing above it.
+/// What a simplex with a corner at the point hides, as seen on the way to the point from where it is approached: the
+/// cone of its edges from there and -approach. None if it is wholly below the tangent hyperplane, and hides nothing above it.
 pub(super) fn fold_cone<const D: usize>(
     mesh: &Mesh<D>,
     position: Vector<D>,
-    normal: Vector<D>,
+    [normal, approach]: [Vector<D>; 2],
     identity: u32,
     simplex: u32,
 ) -> Option<Cone<D>> {
-    let mut columns = [Column::vector(-normal); D];
+    let mut columns = [Column::vector(-approach); D];
     let mut rises = false;
     let others = mesh.simplices[simplex as usize].into_iter();
     for (column, v) in columns.iter_mut().zip(others.filter(|&v| mesh.identity[v as usize] != identity)) {
@@ -32,7 +32,7 @@ pub struct Site<const D: usize> {
     pub position: Vector<D>,
     /// The middle of the hemisphere; of length 1.
     pub normal: Vector<D>,
-    /// The simplices with a corner here that may block something, each as its edges from here and -normal.
+    /// The simplices with a corner here that may block something, each as its edges from here and -approach.
     fold: Vec<Cone<D>>,
     /// The simplex this point is inside of.
     ignored: Option<u32>,
@@ -45,9 +45,9 @@ impl<const D: usize> Site<D> {
         let position = mesh.vertices[vertex as usize];
         let normal = mesh.normals[vertex as usize];
         let identity = mesh.identity[vertex as usize];
-        let fold = (incidence.around(identity).iter())
-            .filter_map(|&simplex| fold_cone(mesh, position, normal, identity, simplex))
-            .collect();
+        let around = incidence.around(identity);
+        let ways = [normal, approach(mesh, around, vertex)];
+        let fold = (around.iter()).filter_map(|&simplex| fold_cone(mesh, position, ways, identity, simplex)).collect();
         Self { position, normal, fold, ignored: None }
     }
 

@@ -171,7 +171,7 @@ mod tests {
             })
             .collect();
         let normal = Vector::<D>::from_fn(|r, _| [0.3, -0.2, 0.9, 0.4][r]);
-        let mut generators = Generators::new(Vector::zeros(), normal);
+        let mut generators = Generators::new(Vector::zeros(), normal, normal);
         let ids: Vec<u32> = points.iter().map(|point| generators.edge_to(point)).collect();
         let mut cones = Vec::new();
         for subset in (0u32..1 << ids.len()).filter(|subset| subset.count_ones() == D as u32) {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{Budget, Hemisphere};
 use crate::accel::{Bvh, Tracer};
 use crate::geometry::{Aabb, Vector};
-use crate::mesh::Incidence;
+use crate::mesh::{Incidence, approach};
 use crate::occlusion::Error;
 use crate::progress::Progress;
 
@@ -130,8 +130,8 @@ fn view_of_vertex<const D: usize>(
     let mesh = tracer.mesh();
     let (position, normal) = (&mesh.vertices[vertex as usize], &mesh.normals[vertex as usize]);
     let identity = mesh.identity[vertex as usize];
-    let mut hemisphere = Hemisphere::new(position, normal)?;
     let around = incidence.around(identity);
+    let mut hemisphere = Hemisphere::approached(position, normal, &approach(mesh, around, vertex))?;
     for &simplex in around {
         let mut others = [*position; D];
         let corners = mesh.simplices[simplex as usize].into_iter();

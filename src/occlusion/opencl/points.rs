@@ -10,7 +10,7 @@ use super::device::Argument;
 use super::layout::{self, Float4, Fold};
 use super::scene::{MOST_RAYS, OnDevice, Part, Scene, float4, is_exact};
 use crate::geometry::{Cone, Frame, Vector};
-use crate::mesh::Incidence;
+use crate::mesh::{Incidence, approach};
 use crate::occlusion::estimate::Tally;
 use crate::occlusion::sampling::Source;
 use crate::occlusion::site::fold_cone;
@@ -118,8 +118,10 @@ impl<const D: usize> Scene<'_, D> {
             }
             Point::Vertex(vertex) => {
                 let (position, identity) = (mesh.vertices[vertex as usize], mesh.identity[vertex as usize]);
-                let cones = incidence.around(identity).iter();
-                let folds = cones.filter_map(|&s| fold_cone(mesh, position, normal, identity, s)).filter_map(fold);
+                let around = incidence.around(identity);
+                let ways = [normal, approach(mesh, around, vertex)];
+                let cones = around.iter().filter_map(|&s| fold_cone(mesh, position, ways, identity, s));
+                let folds = cones.filter_map(fold);
                 let (number, ignored) = (u64::from(vertex), layout::NONE);
                 Prepared { position, frame, number, ignored, serves: serves(&position), folds: folds.collect() }
             }

@@ -33,7 +33,7 @@ use super::estimate::Tally;
 use super::{Estimate, Sampler, Sequence, Settings, Site, Target, estimate_at};
 use crate::accel::Tracer;
 use crate::geometry::{Frame, Vector};
-use crate::mesh::Incidence;
+use crate::mesh::{Incidence, approach};
 
 /// The working memory of one thread: 0.2 MB, to be used for many points.
 #[derive(Debug)]
@@ -97,7 +97,9 @@ impl<const D: usize> Stream<D> {
             target,
         };
         let identity = mesh.identity[vertex as usize];
-        self.traced(&question, Some((normal, identity)), incidence.around(identity), source).estimate()
+        let around = incidence.around(identity);
+        let ways = [normal, approach(mesh, around, vertex)];
+        self.traced(&question, Some((ways, identity)), around, source).estimate()
     }
 
     /// How many of the rays from a point in these directions, none longer than 1, hit a simplex other than `ignored`
@@ -128,7 +130,7 @@ impl<const D: usize> Stream<D> {
     fn traced(
         &mut self,
         question: &Question<D>,
-        vertex: Option<(Vector<D>, u32)>,
+        vertex: Option<([Vector<D>; 2], u32)>,
         around: &[u32],
         source: Source<D>,
     ) -> Tally {
@@ -151,7 +153,7 @@ impl<const D: usize> Stream<D> {
 fn traced_avx2<const D: usize>(
     stream: &mut Stream<D>,
     question: &Question<D>,
-    vertex: Option<(Vector<D>, u32)>,
+    vertex: Option<([Vector<D>; 2], u32)>,
     around: &[u32],
     source: Source<D>,
 ) -> Tally {
@@ -163,25 +165,25 @@ fn traced_avx2<const D: usize>(
 fn traced_avx512<const D: usize>(
     stream: &mut Stream<D>,
     question: &Question<D>,
-    vertex: Option<(Vector<D>, u32)>,
+    vertex: Option<([Vector<D>; 2], u32)>,
     around: &[u32],
     source: Source<D>,
 ) -> Tally {
     traced::<x86::Avx512, D>(stream, question, vertex, around, source)
 }
 
-/// Counts the rays that escape. `vertex` is the normal and identity of the vertex that the rays start from, if it is
-/// one, and `around` the simplices that have it as a corner.
+/// Counts the rays that escape. `vertex` is the normal, the approach and the identity of the vertex that the rays start
+/// from, if it is one, and `around` the simplices that have it as a corner.
 #[inline(always)]
 fn traced<L: Lanes, const D: usize>(
     stream: &mut Stream<D>,
     question: &Question<D>,
-    vertex: Option<(Vector<D>, u32)>,
+    vertex: Option<([Vector<D>; 2], u32)>,
     around: &[u32],
     mut source: Source<D>,
 ) -> Tally {
     match vertex {
-        Some((normal, identity)) => stream.fold.set::<L>(question, normal, identity, around),
+        Some((ways, identity)) => stream.fold.set::<L>(question, ways, identity, around),
         None => stream.fold.clear(),
     }
     let (total, sampler) = match &source {
