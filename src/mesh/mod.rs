@@ -21,6 +21,7 @@ pub mod orientation;
 mod surface;
 pub mod topology;
 mod union_find;
+pub mod weld;
 
 use std::ops::Range;
 
