@@ -24,6 +24,7 @@ pub mod orientation;
 mod surface;
 pub mod topology;
 mod union_find;
+pub mod weld;
 
 use std::ops::Range;
 
