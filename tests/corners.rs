@@ -4,10 +4,12 @@ use std::path::Path;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
-use ao4d::mesh::{Crease, Incidence, Mesh, MeshBuilder, Orientation, Surface};
-use ao4d::occlusion::{Sampler, Settings, Site, ambient_occlusion, at_vertices, exact};
+use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::occlusion::{Estimator, exact};
 use ao4d::progress::Silent;
 use ao4d::scene::{CreaseAngle, ObjectSpec, build_object};
+use ao4d::trace::cpu::{CpuBackend, estimate_at};
+use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 
 fn object<const D: usize>(yaml: serde_json::Value) -> (Surface<D>, Crease) {
     let spec: ObjectSpec = serde_json::from_value(yaml).unwrap();
@@ -28,17 +30,17 @@ fn cuboid<const D: usize>(min: f64, max: f64, pieces: u32) -> (Surface<D>, Creas
 
 /// Exact values, after sampled ones have been held against them and against the slow way.
 fn values<const D: usize>(mesh: &Mesh<D>) -> Vec<f64> {
-    let tracer = Tracer::new(mesh);
-    let settings = Settings { sampler: Sampler::Sobol, samples: 1024, seed: 1, max_distance: f32::INFINITY };
-    let sampled = at_vertices(&tracer, &settings, &Silent).unwrap();
-    let incidence = Incidence::new(mesh);
-    let exact = exact::at_vertices(&tracer, exact::Budget::default(), &Silent).unwrap();
-    for (vertex, (&sampled, exact)) in sampled.iter().zip(&exact).enumerate() {
-        assert!((f64::from(sampled) - exact).abs() < 0.02, "vertex {vertex}: {sampled} sampled, {exact} exact");
-        let site = Site::at_vertex(&tracer, &incidence, vertex as u32);
-        assert_eq!(sampled, ambient_occlusion(&tracer, &site, &settings, vertex as u64), "vertex {vertex}");
+    let backend = CpuBackend::new(Tracer::new(mesh.clone()));
+    let points = ShadingPoint::vertices(mesh);
+    let by = |estimator: Estimator| estimator.estimate(&backend, &points, None, &Silent).unwrap().values;
+    let sampling = Sampling::new(1024, 1);
+    let (sampled, exact) = (by(Estimator::Sampled(sampling)), by(Estimator::Exact(exact::Budget::default())));
+    for (point, (sampled, exact)) in points.iter().zip(sampled.iter().zip(&exact)) {
+        assert!((sampled - exact).abs() < 0.02, "{point:?}: {sampled} sampled, {exact} exact");
+        let slow = estimate_at(backend.tracer(), point, &sampling, &Silent).unwrap();
+        assert_eq!(sampled.to_bits(), slow.value.to_bits(), "{point:?}");
     }
-    exact
+    exact.into_iter().map(f64::from).collect()
 }
 
 fn cubes<const D: usize>() {
@@ -92,7 +94,7 @@ fn notch<const D: usize>(k: usize) {
         let ends = (k..D).filter(|&axis| point[axis] != 1.0).count() as i32;
         let wall = (0..k).any(|axis| mesh.normals[v][axis] == 1.0);
         let hidden = if wall { (1.0 - 0.5f64.powi(k as i32 - 1)) * 0.5f64.powi(ends) } else { 0.0 };
-        assert!((values[v] - (1.0 - hidden)).abs() < 1e-12, "{point:?} {:?}: {}", mesh.normals[v], values[v]);
+        assert!((values[v] - (1.0 - hidden)).abs() < 1e-7, "{point:?} {:?}: {}", mesh.normals[v], values[v]);
         seen += usize::from(wall);
     }
     assert_eq!(seen, k * 3usize.pow((D - k) as u32));
@@ -122,7 +124,7 @@ fn foot<const D: usize>() {
         .collect();
     assert!(feet.len() >= 2 * (D - 1) * 2);
     for v in feet {
-        assert!((values[v] - 0.5).abs() < 1e-12, "{:?} {:?}: {}", mesh.vertices[v], mesh.normals[v], values[v]);
+        assert!((values[v] - 0.5).abs() < 1e-7, "{:?} {:?}: {}", mesh.vertices[v], mesh.normals[v], values[v]);
     }
 }
 
