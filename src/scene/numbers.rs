@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
 
 /// The axes' names, in order.
 pub const AXES: [&str; 4] = ["x", "y", "z", "w"];
@@ -83,6 +83,14 @@ pub fn subdivisions<const D: usize>(key: &str, given: &OneOrEach<u32>) -> Result
         return Err(Error::invalid(key, "0 subdivisions; the least is 1"));
     }
     Ok(each)
+}
+
+/// Refuses a shape, written at `key`, in scenes of the dimension that has none of it; `instead` ends the message.
+pub fn only_in<const D: usize>(wanted: Dimension, key: &str, instead: &str) -> Result<(), Error> {
+    if wanted == Dimension::of::<D>() {
+        return Ok(());
+    }
+    Err(Error::invalid(key, format!("needs a scene of dimension {wanted}, not {D}{instead}")))
 }
 
 /// Refuses an object with more simplices than [`MAX_SIMPLICES`], before it is built.

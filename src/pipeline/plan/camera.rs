@@ -7,6 +7,7 @@
 use serde::Serialize;
 
 use super::range::{check_length, positive};
+use crate::geometry::Dimension;
 use crate::pipeline::error::Invalid;
 use crate::pipeline::spec::{CameraSpec, Projection};
 
@@ -48,16 +49,17 @@ pub enum ProjectionPlan {
 pub(super) fn plan(
     spec: &CameraSpec,
     path: &str,
-    dimension: usize,
+    dimension: Dimension,
     warnings: &mut Vec<Invalid>,
 ) -> Result<CameraPlan, Invalid> {
-    let axis = |a: usize| -> Vec<f64> { (0..dimension).map(|i| f64::from(i == a)).collect() };
+    let count = dimension.get();
+    let axis = |a: usize| -> Vec<f64> { (0..count).map(|i| f64::from(i == a)).collect() };
     let vector = |key: &str, given: &Option<Vec<f64>>, default: Vec<f64>| match given {
-        Some(v) => check_vector(&format!("{path}.{key}"), v, dimension),
+        Some(v) => check_vector(&format!("{path}.{key}"), v, count),
         None => Ok(default),
     };
-    let eye = vector("eye", &spec.eye, axis(dimension - 1))?;
-    let target = vector("target", &spec.target, vec![0.0; dimension])?;
+    let eye = vector("eye", &spec.eye, axis(count - 1))?;
+    let target = vector("target", &spec.target, vec![0.0; count])?;
     let back: Vec<f64> = eye.iter().zip(&target).map(|(e, t)| e - t).collect();
     let Some(back) = normalised(&back) else {
         let key = if spec.target.is_some() { "target" } else { "eye" };
@@ -71,11 +73,11 @@ pub(super) fn plan(
     };
     let frame = vec![frame[0].clone(), up_part];
     let over = match (dimension, &spec.over) {
-        (3, None) => None,
-        (3, Some(_)) => {
+        (Dimension::Three, None) => None,
+        (Dimension::Three, Some(_)) => {
             return Err(Invalid::new(format!("{path}.over"), "a 3D scene has no direction over; take the key out"));
         }
-        _ => {
+        (Dimension::Four, _) => {
             let over = vector("over", &spec.over, axis(2))?;
             if independent(&over, &frame).is_none() {
                 let plane = "the plane of the line of sight and `up`";
@@ -161,9 +163,9 @@ fn dependent(path: &str, key: &str, given: bool, within: &str, frame: &[Vec<f64>
 mod tests {
     use super::*;
 
-    fn camera(yaml: &str, dimension: usize) -> Result<CameraPlan, String> {
+    fn camera(yaml: &str, dimension: u64) -> Result<CameraPlan, String> {
         let spec: CameraSpec = crate::pipeline::Document::parse("c.yaml", yaml).unwrap().decode().unwrap();
-        plan(&spec, "camera", dimension, &mut Vec::new()).map_err(|e| e.to_string())
+        plan(&spec, "camera", Dimension::new(dimension).unwrap(), &mut Vec::new()).map_err(|e| e.to_string())
     }
 
     #[test]

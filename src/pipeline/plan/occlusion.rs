@@ -8,17 +8,15 @@ use super::{
     Computation, MAX_CONES, MAX_OBJECTS, MAX_SAMPLES, NO_SCENE, OcclusionPlan, OcclusionSource, Samples, ScenePlan,
     StageRef,
 };
+use crate::geometry::Dimension;
 use crate::occlusion::exact;
 use crate::pipeline::error::Invalid;
 use crate::pipeline::spec::{Method, OcclusionSpec, SceneSpec};
 
 pub(super) fn scene(resolver: &mut Resolver, path: &str, id: String, spec: &SceneSpec) -> Result<ScenePlan, Invalid> {
-    let dimension = match spec.dimension {
-        None | Some(4) => 4,
-        Some(3) => 3,
-        Some(other) => {
-            return Err(Invalid::new(format!("{path}.dimension"), format!("expected 3 or 4, found {other}")));
-        }
+    let number = spec.dimension.unwrap_or(4);
+    let Some(dimension) = Dimension::new(number) else {
+        return Err(Invalid::new(format!("{path}.dimension"), format!("expected 3 or 4, found {number}")));
     };
     let objects = format!("{path}.objects");
     if spec.objects.is_empty() {
