@@ -19,6 +19,7 @@ mod data_array;
 mod document;
 mod image;
 mod mesh;
+mod nesting;
 
 use std::path::Path;
 
@@ -95,7 +96,7 @@ impl Field {
 /// # Errors
 /// If it cannot be read, is damaged, cut short, or foreign.
 pub fn read(path: &Path) -> Result<DataSet, Error> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     parse(&bytes).map_err(|problem| Error::File { path: path.into(), problem })
 }
 
@@ -128,6 +129,7 @@ pub fn parse(bytes: &[u8]) -> Result<DataSet, Problem> {
         });
     }
     let parts = document::cut(bytes)?;
+    nesting::check(&parts.head)?;
     let xml = roxmltree::Document::parse(&parts.head).map_err(|e| Problem::Xml(e.to_string()))?;
     let document = document::Document::new(xml.root_element(), parts.appended)?;
     match document.kind {
