@@ -20,6 +20,7 @@
 pub mod accel;
 pub mod export;
 pub mod geometry;
+pub mod input;
 pub mod inspect;
 pub mod mesh;
 pub mod occlusion;
@@ -27,4 +28,5 @@ pub mod pipeline;
 pub mod progress;
 pub mod render;
 pub mod scene;
+pub mod text;
 pub mod volume;

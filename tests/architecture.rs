@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// From the ground up; modules on one floor don't know each other.
 const FLOORS: &[&[&str]] = &[
-    &["geometry", "progress"],
+    &["geometry", "input", "progress", "text"],
     &["volume", "mesh"],
     &["scene", "accel"],
     &["occlusion"],

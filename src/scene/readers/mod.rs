@@ -115,7 +115,7 @@ impl Input {
                 );
             }
         };
-        let bytes = std::fs::read(&self.path).map_err(|source| self.unreadable(source))?;
+        let bytes = crate::input::read(&self.path).map_err(|source| self.unreadable(source))?;
         if bytes.is_empty() {
             return Err(self.wrong("is empty"));
         }
