@@ -168,7 +168,7 @@ fn ranges() {
         (
             "id: image",
             "camera: {field_of_view: ^180}",
-            "stages[2].render.camera.field_of_view: expected degrees above 0 and below 180, found 180",
+            "stages[2].render.camera.field_of_view: expected 0.001 to 179.999 degrees, found 180",
         ),
         (
             "id: image",
