@@ -53,6 +53,10 @@ impl Document {
         let mut document =
             Document { file: file.to_owned(), folder: parent(Path::new(file)), root: blank, sets: Vec::new() };
         document.root = yaml::parse(text).map_err(|p| document.error(p))?;
+        if matches!(document.root.value, Value::Null) {
+            let problem = Problem::new("is empty; a pipeline is a mapping with `name` and `stages`");
+            return Err(document.error(problem.or_at(Origin::File { line: 1, column: 1 })));
+        }
         Ok(document)
     }
 
