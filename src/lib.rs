@@ -4,7 +4,7 @@
 //! voxels (or of pixels), which ParaView opens. Data flows one way:
 //!
 //! ```text
-//! text -> pipeline -> scene -> mesh -> accel -> occlusion -> render -> export -> files
+//! text -> pipeline -> scene -> mesh -> accel -> occlusion -> render -> io -> files
 //! ```
 //!
 //! ```no_run
@@ -18,10 +18,10 @@
 //! ```
 
 pub mod accel;
-pub mod export;
 pub mod geometry;
 pub mod input;
 pub mod inspect;
+pub mod io;
 pub mod mesh;
 pub mod occlusion;
 pub mod pipeline;

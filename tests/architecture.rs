@@ -6,10 +6,10 @@ use std::path::Path;
 const FLOORS: &[&[&str]] = &[
     &["geometry", "input", "progress", "text"],
     &["volume", "mesh"],
+    &["io"],
     &["scene", "accel"],
     &["occlusion"],
     &["render"],
-    &["export"],
     &["inspect", "pipeline"],
 ];
 

@@ -322,7 +322,7 @@ stages:
     let report = ao4d::pipeline::run(&pipeline, &Default::default(), &ao4d::progress::Silent).unwrap();
     let told = "scene void, object 1: isosurface.isovalue: the field is outside everywhere: its values go from -2 to 2";
     assert!(report.notes.len() == 1 && report.notes[0].starts_with(told), "{:?}", report.notes);
-    let opacity = ao4d::volume::read(&out.join("image.vti")).unwrap().array("opacity").unwrap().values.to_f64();
+    let opacity = ao4d::io::vtk::read_volume(&out.join("image.vti")).unwrap().array("opacity").unwrap().values.to_f64();
     assert!(opacity.len() == 125 && opacity.iter().all(|&o| o == 0.0));
     assert_eq!(std::fs::metadata(out.join("ao.f32")).unwrap().len(), 0);
 }

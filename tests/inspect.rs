@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use ao4d::export::{raw, vti, vtu};
 use ao4d::inspect::surface::{Form, SurfaceSummary};
 use ao4d::inspect::{Description, Info};
+use ao4d::io::{raw, vti, vtu};
 use ao4d::scene::{ObjectSpec, build_object};
 use ao4d::volume::{Array, Grid, Volume};
 use serde_json::{Value, json};

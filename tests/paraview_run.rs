@@ -5,9 +5,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use ao4d::io::vtk;
 use ao4d::pipeline::{Pipeline, Settings, run};
 use ao4d::progress::Silent;
-use ao4d::volume::{self, Values};
+use ao4d::volume::Values;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -52,8 +53,8 @@ fn numbers(value: &serde_json::Value) -> Vec<f64> {
 fn vtk_reads_a_run_as_it_was_written() {
     let folder = tempfile::tempdir().unwrap();
     run_text(ASYMMETRIC, folder.path());
-    let image = volume::read(&folder.path().join("image.vti")).unwrap();
-    let mesh = volume::vtk::read_mesh(&folder.path().join("mesh.vtu")).unwrap();
+    let image = vtk::read_volume(&folder.path().join("image.vti")).unwrap();
+    let mesh = vtk::read_mesh(&folder.path().join("mesh.vtu")).unwrap();
     for python in pythons() {
         let script = Path::new(ROOT).join("tests/python/check_run.py");
         let output = Command::new(&python).arg(script).arg(folder.path()).output().expect("python: run tests/install");
@@ -93,7 +94,7 @@ fn vtk_reads_a_run_as_it_was_written() {
 fn an_asymmetric_scene_comes_out_the_right_way_round() {
     let folder = tempfile::tempdir().unwrap();
     run_text(ASYMMETRIC, folder.path());
-    let image = volume::read(&folder.path().join("image.vti")).unwrap();
+    let image = vtk::read_volume(&folder.path().join("image.vti")).unwrap();
     let Values::U16(object) = &image.array("object").unwrap().values else { panic!("type") };
     let raw = std::fs::read(folder.path().join("image.raw")).unwrap();
     for (place, &number) in object.iter().enumerate().filter(|(_, o)| **o > 0) {

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use ao4d::export::paraview::{Axis, Cut, Figure, Panel, Source, state};
+use ao4d::io::paraview::{Axis, Cut, Figure, Panel, Source, state};
 use ao4d::volume::Grid;
 
 /// A small image: its grid, and the colour of each voxel, none where there is nothing.

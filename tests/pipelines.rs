@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use ao4d::io::vtk;
 use ao4d::pipeline::plan::OcclusionSource;
 use ao4d::pipeline::spec::Method;
 use ao4d::pipeline::{Pipeline, Report, Settings, run};
 use ao4d::progress::Silent;
-use ao4d::volume;
 
 /// All `.yaml` files below `pipelines/`.
 fn pipelines() -> Vec<PathBuf> {
@@ -47,7 +47,7 @@ fn every_pipeline_leaves_what_it_promises() {
             let render = &pipeline.plan.renders[write.render];
             let voxels = render.voxels() as usize;
             if let Some(file) = &write.vti {
-                let image = volume::read(&folder.path().join(file)).unwrap();
+                let image = vtk::read_volume(&folder.path().join(file)).unwrap();
                 assert_eq!(image.grid.dimensions, render.dimensions);
                 let names: Vec<&str> = image.arrays.iter().map(|a| a.name.as_str()).collect();
                 let expected: Vec<&str> = write.arrays.iter().map(|a| a.name()).collect();

@@ -62,7 +62,7 @@ fn references_are_worth_comparing_with() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "vti") {
             volumes += 1;
-            let volume = ao4d::volume::read(&path).unwrap();
+            let volume = ao4d::io::vtk::read_volume(&path).unwrap();
             let opacity = volume.array("opacity").unwrap().values.to_f64();
             let seen = opacity.iter().filter(|&&o| o > 0.0).count();
             assert!(seen > 300 && seen < opacity.len(), "{}: {seen} of {}", path.display(), opacity.len());

@@ -6,10 +6,10 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use ao4d::export::vti::{self, ArraySpec, Compression, Encoding, Settings, VtiWriter};
-use ao4d::export::{AtomicFile, raw, vtu};
-use ao4d::volume::compare::{self, Tolerance};
-use ao4d::volume::vtk::{self, DataSet};
+use ao4d::inspect::compare::{self, Tolerance};
+use ao4d::io::vti::{self, ArraySpec, Compression, Encoding, Settings, VtiWriter};
+use ao4d::io::vtk::{self, DataSet};
+use ao4d::io::{AtomicFile, raw, vtu};
 use ao4d::volume::{Array, Grid, Kind, Values, Volume};
 
 const ENCODINGS: [Encoding; 2] = [Encoding::Appended, Encoding::Inline];
@@ -202,7 +202,7 @@ fn foreign_files_are_named() {
     assert!(message(b"solid ant\nfacet").contains("begins with \"solid ant"));
     assert!(message(b"# vtk DataFile Version 3.0\n").contains("save it as `.vti`"));
     assert!(message(b"<VTKFile type=\"Table\"><Table/></VTKFile>").contains("holds Table"));
-    let missing = ao4d::volume::read(Path::new("does/not/exist.vti")).unwrap_err().to_string();
+    let missing = ao4d::io::vtk::read_volume(Path::new("does/not/exist.vti")).unwrap_err().to_string();
     assert!(missing.contains("does/not/exist.vti"), "{missing}");
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use ao4d::inspect;
-use ao4d::volume::compare::Tolerance;
+use ao4d::inspect::compare::Tolerance;
 use clap::Args;
 
 use super::console::Console;

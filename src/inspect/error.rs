@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::io::vtk;
 use crate::occlusion::FileError;
-use crate::volume;
 
 /// Something is wrong with a file, or two of them don't go together.
 #[derive(Debug, thiserror::Error)]
@@ -24,7 +24,7 @@ pub enum Error {
     },
     /// A VTK file that can't be taken in.
     #[error(transparent)]
-    Vtk(#[from] volume::Error),
+    Vtk(#[from] vtk::Error),
     /// Another mesh that can't be taken in.
     #[error("{}: {message}", path.display())]
     Mesh {

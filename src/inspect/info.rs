@@ -10,8 +10,8 @@ use serde_json::{Map, Value};
 use super::range::Short;
 use super::surface::SurfaceSummary;
 use super::{ArraySummary, COLOURS, Contents, Error, OCCLUSION, Range};
+use crate::io::vtk::{Field, Image, UnstructuredGrid, cell_name};
 use crate::occlusion::Sidecar;
-use crate::volume::vtk::{Field, Image, UnstructuredGrid, cell_name};
 use crate::volume::{Array, Values};
 
 /// What a file holds.

@@ -5,7 +5,7 @@
 //!
 //! | file | read as |
 //! | --- | --- |
-//! | `.vti`, `.vtu`, `.vtp` | an image or a mesh, as [`crate::volume::vtk`] reads it |
+//! | `.vti`, `.vtu`, `.vtp` | an image or a mesh, as [`crate::io::vtk`] reads it |
 //! | `.stl`, `.ply` | a mesh of triangles, as a scene would take it |
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
 //! | `.raw` | colours without a header: only how many |
@@ -13,6 +13,7 @@
 //! From there [`compare()`] goes number by number, and [`Info`] describes: ranges of arrays, and of a simplicial mesh
 //! whether it is closed, oriented and welded ([`surface`]).
 
+pub mod compare;
 mod error;
 mod info;
 mod range;
@@ -24,11 +25,11 @@ pub use error::Error;
 pub use info::{Description, Info};
 pub use range::{ArraySummary, Range};
 
+use self::compare::{Comparison, Tolerance};
+use crate::io::mesh::{Cells, FileMesh};
+use crate::io::vtk::{self, DataSet, Image, TETRAHEDRON, TRIANGLE, UnstructuredGrid};
+use crate::io::{Input, InputError};
 use crate::occlusion::{self, Sidecar};
-use crate::scene;
-use crate::scene::readers::{Cells, FileMesh, Input};
-use crate::volume::compare::{self, Comparison, Tolerance};
-use crate::volume::vtk::{self, DataSet, Image, TETRAHEDRON, TRIANGLE, UnstructuredGrid};
 use crate::volume::{Array, Kind, Values};
 
 /// What values at vertices are called, here as in the files of meshes.
@@ -142,9 +143,9 @@ fn occlusion_file(path: &Path) -> Result<Contents, Error> {
 /// A mesh from a file that isn't VTK's.
 fn triangles(path: &Path) -> Result<UnstructuredGrid, Error> {
     let mesh = Input::new("", Path::new(""), path).read().map_err(|error| match error {
-        scene::Error::Unreadable { path, source, .. } => Error::Open { path, cause: source },
-        scene::Error::Content { path, message, .. } => Error::Mesh { path, message },
-        scene::Error::Invalid { message, .. } => Error::Mesh { path: path.into(), message },
+        InputError::Unreadable { path, source, .. } => Error::Open { path, cause: source },
+        InputError::Content { path, message, .. } => Error::Mesh { path, message },
+        InputError::Invalid { message, .. } => Error::Mesh { path: path.into(), message },
     })?;
     Ok(grid(mesh))
 }

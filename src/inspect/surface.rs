@@ -11,11 +11,11 @@ use serde::Serialize;
 
 use super::range::Short;
 use crate::geometry::{Vector64, is_degenerate, narrow};
+use crate::io::vtk::{TETRAHEDRON, TRIANGLE, UnstructuredGrid};
 use crate::mesh::identity::identities;
 use crate::mesh::topology::{
     components, corners, enclosed_volume, f_vector, facet_pairs, singular_vertices, surface_measure, worst_quality,
 };
-use crate::volume::vtk::{TETRAHEDRON, TRIANGLE, UnstructuredGrid};
 
 /// Beyond this coordinates are refused by scenes.
 const LARGEST: f64 = 1e30;

@@ -19,6 +19,7 @@ pub mod normals;
 pub mod orientation;
 mod surface;
 pub mod topology;
+pub mod weld;
 
 use std::ops::Range;
 

@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 
 use super::plan::{OcclusionSource, Plan, ScenePlan, WritePlan};
 use super::prepare::{errors_path, sidecar_path};
-use crate::export::{self, AtomicFile};
+use crate::io::{self, AtomicFile};
 use crate::scene::Orientation;
 
 /// The file's name in the output folder.
@@ -60,7 +60,7 @@ impl Cache {
     ///
     /// # Errors
     /// If the folder can't be written to.
-    pub fn record(&mut self, file: &Path, key: &str) -> Result<(), export::Error> {
+    pub fn record(&mut self, file: &Path, key: &str) -> Result<(), io::Error> {
         if let Some(entry) = self.state(file, key) {
             self.entries.insert(file.to_string_lossy().into_owned(), entry);
         }

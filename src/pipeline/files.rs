@@ -9,9 +9,9 @@ use super::plan::{Computation, OcclusionSource, Plan, Samples, WritePlan};
 use super::prepare::sidecar_path;
 use super::spec;
 use super::work::Stale;
-use crate::export::vti::{self, ArraySpec, VtiWriter};
-use crate::export::{self, AtomicFile, Error, png, raw::RawWriter, vtu};
 use crate::geometry::widen;
+use crate::io::vti::{self, ArraySpec, VtiWriter};
+use crate::io::{self, AtomicFile, Error, png, raw::RawWriter, vtu};
 use crate::mesh::Mesh;
 use crate::occlusion::{self, Estimates, Sidecar};
 use crate::render::{Camera, Channel, Picture};
@@ -282,4 +282,4 @@ pub(super) fn holds(path: &Path, bytes: &[u8]) -> bool {
         && crate::input::read(path).is_ok_and(|found| found == bytes)
 }
 
-pub(super) use export::paraview;
+pub(super) use io::paraview;

@@ -6,7 +6,7 @@ use super::RunError;
 use super::plan::{Plan, RenderPlan, WritePlan};
 use super::spec::{Compression, Encoding};
 use super::work::Stale;
-use crate::export;
+use crate::io;
 use crate::render::{Channel, Fragment};
 use crate::volume::available_memory;
 
@@ -22,7 +22,7 @@ pub(super) fn check(plan: &Plan, stale: &Stale) -> Result<(), RunError> {
         return Err(RunError::Memory { render: plan.renders[render].id.clone(), needed, available });
     }
     let disk = (0..plan.writes.len()).map(|write| disk(plan, stale, write)).fold(0, u64::saturating_add);
-    export::check_free_space(&plan.out, disk)?;
+    io::check_free_space(&plan.out, disk)?;
     Ok(())
 }
 

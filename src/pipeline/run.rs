@@ -21,7 +21,7 @@ use super::spec;
 use super::work::Stale;
 use super::{Error, Pipeline, Settings, figure, limits};
 use crate::accel::Tracer;
-use crate::export;
+use crate::io;
 use crate::mesh::Mesh;
 use crate::occlusion::opencl::{self, OpenCl};
 use crate::occlusion::{self, Cancelled, Estimates};
@@ -45,7 +45,7 @@ pub enum RunError {
     OpenCl(#[from] opencl::Error),
     /// A file can't be written.
     #[error(transparent)]
-    Export(#[from] export::Error),
+    Export(#[from] io::Error),
     /// A picture doesn't fit in memory.
     #[error(
         "render {render}: one layer of its picture takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays"
@@ -102,7 +102,7 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     progress.end();
     let Prepared { meshes, loaded, notes } = prepared?;
     if stale.anything() {
-        export::check_writable(&plan.out)?;
+        io::check_writable(&plan.out)?;
     }
     let building = began.elapsed();
     let report = Report { out: plan.out.clone(), notes, ..Report::default() };

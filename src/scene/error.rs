@@ -1,6 +1,6 @@
 //! What can be wrong with an object of a scene.
 
-use std::path::PathBuf;
+use crate::io::InputError;
 
 /// An object that can't be built.
 #[derive(Debug, thiserror::Error)]
@@ -13,26 +13,9 @@ pub enum Error {
         /// What was found, and what to do about it.
         message: String,
     },
-    /// A file that the object names can't be opened or read.
-    #[error("{key}: can't read {}: {source}", path.display())]
-    Unreadable {
-        /// Dotted path of the key that names the file.
-        key: String,
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A file that the object names holds something else than it should.
-    #[error("{key}: {}: {message}", path.display())]
-    Content {
-        /// Dotted path of the key that names the file.
-        key: String,
-        /// The file.
-        path: PathBuf,
-        /// What was found, and what to do about it.
-        message: String,
-    },
+    /// A file that the object names can't be taken in.
+    #[error(transparent)]
+    Input(#[from] InputError),
 }
 
 impl Error {
@@ -44,7 +27,8 @@ impl Error {
     /// The dotted path within the object of the key to blame; empty for the object itself.
     pub fn key(&self) -> &str {
         match self {
-            Self::Invalid { key, .. } | Self::Unreadable { key, .. } | Self::Content { key, .. } => key,
+            Self::Invalid { key, .. } => key,
+            Self::Input(error) => error.key(),
         }
     }
 }

@@ -26,11 +26,12 @@ use super::fill::fill;
 use super::lattice::compact;
 use super::numbers::{check_count, finite, point};
 use super::product::Chain;
-use super::readers::{Cells, Input};
 use super::transform::{self, TransformStep};
-use super::weld::weld;
 use crate::geometry::{Vector64, determinant};
+use crate::io::Input;
+use crate::io::mesh::Cells;
 use crate::mesh::Surface;
+use crate::mesh::weld::weld;
 
 /// A mesh from a file, swept along the fourth axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

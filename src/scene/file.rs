@@ -7,13 +7,13 @@
 
 use std::path::Path;
 
-use super::Error;
 use super::numbers::MAX_SIMPLICES;
-use super::readers::{Cells, Input};
+use crate::io::mesh::Cells;
+use crate::io::{Input, InputError};
 use crate::mesh::Surface;
 
 /// The surface that the file holds.
-pub fn build<const D: usize>(path: &Path, folder: &Path) -> Result<Surface<D>, Error> {
+pub fn build<const D: usize>(path: &Path, folder: &Path) -> Result<Surface<D>, InputError> {
     let input = Input::new("file", folder, path);
     let mesh = input.read()?;
     let position = mesh.vectors::<D>("position", &input)?;

@@ -1,9 +1,9 @@
 //! Rectilinear lattices: the points where axis-parallel planes cross, which boxes and cut cubes take their vertices from.
 
-use std::collections::HashMap;
-
 use crate::geometry::Vector64;
 use crate::mesh::Surface;
+
+pub use crate::mesh::weld::compact;
 
 /// Planes along each axis, in ascending order. Point (i, j, k, l) has index `((i * n_y + j) * n_z + k) * n_w + l`: the
 /// last axis runs fastest, as in a product of intervals.
@@ -47,14 +47,4 @@ impl<const D: usize> Lattice<D> {
         let (used, simplices) = compact(simplices);
         Surface { vertices: used.into_iter().map(|index| self.point(index)).collect(), simplices, normals: None }
     }
-}
-
-/// Renumbers the vertices so that only those in use remain, in their order; returns their former indices.
-pub fn compact<const D: usize>(mut simplices: Vec<[u32; D]>) -> (Vec<u32>, Vec<[u32; D]>) {
-    let mut used: Vec<u32> = simplices.as_flattened().to_vec();
-    used.sort_unstable();
-    used.dedup();
-    let renumbered: HashMap<u32, u32> = used.iter().zip(0..).map(|(&old, new)| (old, new)).collect();
-    simplices.as_flattened_mut().iter_mut().for_each(|vertex| *vertex = renumbered[vertex]);
-    (used, simplices)
 }

@@ -7,12 +7,12 @@
 //! | key | what | made by |
 //! | --- | --- | --- |
 //! | `simplices` | vertices and simplices as listed | - |
-//! | `file` | a surface from a file | [`readers`] |
+//! | `file` | a surface from a file | [`crate::io::mesh`] |
 //! | `box`, `tesseract` | boundary of a product of intervals | [`product`] |
-//! | `extrude` | a 3D mesh swept along w | [`readers`], [`product`], `fill` |
+//! | `extrude` | a 3D mesh swept along w | [`crate::io::mesh`], [`product`], `fill` |
 //! | `cut_cube` | a box minus boxes | [`lattice`] |
 //! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
-//! | `spin` | a 3D mesh turned round in a plane with w | [`readers`], [`product`] |
+//! | `spin` | a 3D mesh turned round in a plane with w | [`crate::io::mesh`], [`product`] |
 //! | `polytope` | one of the six regular polytopes | - |
 //! | `duoprism`, `duocylinder`, `spherinder`, `cubinder` | boundary of a product of two solids | [`product`] |
 //! | `isosurface` | where a formula or a grid of values passes a value | [`isosurface`] |
@@ -35,11 +35,9 @@ mod object;
 pub mod polytope;
 pub mod product;
 mod products;
-pub mod readers;
 mod simplices;
 mod spin;
 mod transform;
-mod weld;
 
 pub use color::Color;
 pub use cuboid::{BoxSpec, TesseractSpec};

@@ -167,7 +167,7 @@ impl Shape<'_> {
     fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
-            Shape::File(path) => file::build(path, folder),
+            Shape::File(path) => Ok(file::build(path, folder)?),
             Shape::Extrude(spec) => spec.build(folder),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),

@@ -15,10 +15,11 @@ use super::Error;
 use super::extrude::solid;
 use super::numbers::{AXES, check_count, finite};
 use super::product::Chain;
-use super::readers::{Cells, Input};
-use super::weld::weld;
 use crate::geometry::Vector64;
+use crate::io::Input;
+use crate::io::mesh::Cells;
 use crate::mesh::Surface;
+use crate::mesh::weld::weld;
 
 /// A mesh from a file, turned all the way round in a plane with w.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,21 +1,12 @@
-//! Images: a regular grid of voxels, as VTK's `ImageData` means it, the arrays on it, reading and comparison.
+//! Images: a regular grid of voxels, as VTK's `ImageData` means it, the arrays on it.
 //!
 //! Point (i, j, k) of the grid is at `origin + (i, j, k) * spacing`, and its flat index is `i + W (j + H k)`: x runs
 //! fastest. A 2D image is a volume of one layer.
-//!
-//! [`read()`] takes an image from a file, [`vtk`] whatever else VTK's files hold, and [`compare`] says how far two of
-//! them are apart.
 
 mod array;
-pub mod compare;
-mod error;
 mod memory;
-pub mod vtk;
-
-use std::path::Path;
 
 pub use array::{Array, Kind, Values};
-pub use error::{Error, Problem};
 pub use memory::available_memory;
 
 /// Dimensions and placement of an image. Voxel centres are the grid's points.
@@ -77,19 +68,6 @@ impl Volume {
     /// The array of this name.
     pub fn array(&self, name: &str) -> Option<&Array> {
         self.arrays.iter().find(|a| a.name == name)
-    }
-}
-
-/// Reads an image from a `.vti` file.
-///
-/// # Errors
-/// If it cannot be read, is damaged or something else, or carries what a [`Volume`] cannot: arrays on cells, or a
-/// rotated grid. Nothing is left out in silence; [`vtk::read`] takes such files too.
-pub fn read(path: &Path) -> Result<Volume, Error> {
-    let in_file = |problem| Error::File { path: path.into(), problem };
-    match vtk::read(path)? {
-        vtk::DataSet::Image(image) => image.into_volume().map_err(in_file),
-        vtk::DataSet::Unstructured(_) => Err(in_file(Problem::Kind { found: "a mesh".into(), expected: "an image" })),
     }
 }
 

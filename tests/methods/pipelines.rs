@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use ao4d::io::vtk;
 use ao4d::occlusion::{Sidecar, decode};
 use ao4d::pipeline::{AnyMesh, Pipeline, Settings, run};
 use ao4d::progress::Silent;
-use ao4d::volume;
 
 fn ao4d(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ao4d")).current_dir(folder).args(arguments).output().unwrap()
@@ -133,7 +133,7 @@ fn visible_points_in_closed_form() {
         pair(folder.path(), occlusion, "shading: voxel");
         let output = ao4d(folder.path(), &["run", "p.yaml", "-q", "--out", "out"]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        let image = volume::read(&folder.path().join("out/image.vti")).unwrap();
+        let image = vtk::read_volume(&folder.path().join("out/image.vti")).unwrap();
         images.push(image.array("ambient_occlusion").unwrap().values.to_f64());
     }
     assert!(images[0].iter().filter(|&&a| a < 0.95).count() > 5, "{:?}", images[0]);
@@ -169,7 +169,7 @@ fn errors_stand_beside_values() {
         let output = ao4d(folder.path(), &all);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         let sidecar = Sidecar::from_yaml(&std::fs::read_to_string(out.join("ao.f32.yaml")).unwrap()).unwrap();
-        let mesh = volume::vtk::read_mesh(&out.join("scene.vtu")).unwrap();
+        let mesh = vtk::read_mesh(&out.join("scene.vtu")).unwrap();
         let error = mesh.point_array("occlusion_error").map(|a| a.values.to_f64());
         (sidecar, error)
     };

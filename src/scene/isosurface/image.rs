@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use super::super::Error;
 use super::super::numbers::{AXES, OneOrEach, point, subdivisions};
-use super::super::readers::image::{self, ByteOrder, Image, Number, Request, Slices};
 use super::march::Layers;
 use super::{Seen, Side};
+use crate::io::image::{self, ByteOrder, Image, Number, Request, Slices};
 
 /// The key in the pipeline.
 const KEY: &str = "isosurface.field.image";

@@ -10,8 +10,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::vtk::{DataSet, Image, UnstructuredGrid};
-use super::{Array, Grid, Values, Volume};
+use crate::io::vtk::{DataSet, Image, UnstructuredGrid};
+use crate::volume::{Array, Grid, Values, Volume};
 
 /// What still counts as the same.
 #[derive(Clone, Debug, Default, PartialEq)]

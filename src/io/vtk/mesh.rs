@@ -2,10 +2,11 @@
 
 use roxmltree::Node;
 
-use super::super::{Array, Problem, Values};
+use super::Problem;
 use super::data_array::{array, attributes, field_data};
 use super::document::{Document, child, required};
 use super::{Field, TETRAHEDRON, TRIANGLE};
+use crate::volume::{Array, Values};
 
 /// VTK's number for a polyhedron, whose faces lie in further arrays.
 const POLYHEDRON: u8 = 42;

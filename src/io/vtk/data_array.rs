@@ -6,10 +6,11 @@ use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use roxmltree::Node;
 
-use super::super::{Array, Kind, Problem, Values};
 use super::Field;
+use super::Problem;
 use super::blocks::decompress;
 use super::document::{Appended, Document, required};
+use crate::volume::{Array, Kind, Values};
 
 /// base64 without its closing `=`, which [`base64_bytes`] looks after.
 const BASE64: GeneralPurpose = GeneralPurpose::new(

@@ -7,9 +7,9 @@
 
 use std::io::Cursor;
 
-use super::super::weld::weld;
 use super::{Cells, FileMesh};
 use crate::geometry::Vector64;
+use crate::mesh::weld::weld;
 
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;

@@ -1,9 +1,10 @@
 //! `<ImageData>`: a grid of voxels.
 
-use super::super::{Array, Grid, Problem, Volume};
 use super::Field;
+use super::Problem;
 use super::data_array::{attributes, field_data};
 use super::document::{Document, numbers};
+use crate::volume::{Array, Grid, Volume};
 
 /// Axes that are not rotated.
 const IDENTITY: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];

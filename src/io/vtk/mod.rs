@@ -17,16 +17,18 @@
 mod blocks;
 mod data_array;
 mod document;
+mod error;
 mod image;
 mod mesh;
 mod nesting;
 
 use std::path::Path;
 
+pub use error::{Error, Problem};
 pub use image::Image;
 pub use mesh::UnstructuredGrid;
 
-use super::{Array, Error, Problem};
+use crate::volume::{Array, Volume};
 
 /// VTK's number for a triangle.
 pub const TRIANGLE: u8 = 5;
@@ -111,6 +113,19 @@ pub fn read_mesh(path: &Path) -> Result<UnstructuredGrid, Error> {
             path: path.into(),
             problem: Problem::Kind { found: "an image".into(), expected: "a mesh" },
         }),
+    }
+}
+
+/// Reads an image from a `.vti` file.
+///
+/// # Errors
+/// If it cannot be read, is damaged or something else, or carries what a [`Volume`] cannot: arrays on cells, or a
+/// rotated grid. Nothing is left out in silence; [`read`] takes such files too.
+pub fn read_volume(path: &Path) -> Result<Volume, Error> {
+    let in_file = |problem| Error::File { path: path.into(), problem };
+    match read(path)? {
+        DataSet::Image(image) => image.into_volume().map_err(in_file),
+        DataSet::Unstructured(_) => Err(in_file(Problem::Kind { found: "a mesh".into(), expected: "an image" })),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Welding: points with identical coordinates become one.
+//! Welding: points with identical coordinates become one, and points that nothing uses go.
 
 use std::collections::HashMap;
 
@@ -21,6 +21,16 @@ pub fn weld<const D: usize, const N: usize>(
         .map(|simplex| simplex.map(|i| representative[i as usize]))
         .filter(|simplex| (1..N).all(|i| !simplex[..i].contains(&simplex[i])))
         .collect();
-    let (used, simplices) = super::lattice::compact(welded);
+    let (used, simplices) = compact(welded);
     (used.into_iter().map(|i| points[i as usize]).collect(), simplices)
+}
+
+/// Renumbers the vertices so that only those in use remain, in their order; returns their former indices.
+pub fn compact<const D: usize>(mut simplices: Vec<[u32; D]>) -> (Vec<u32>, Vec<[u32; D]>) {
+    let mut used: Vec<u32> = simplices.as_flattened().to_vec();
+    used.sort_unstable();
+    used.dedup();
+    let renumbered: HashMap<u32, u32> = used.iter().zip(0..).map(|(&old, new)| (old, new)).collect();
+    simplices.as_flattened_mut().iter_mut().for_each(|vertex| *vertex = renumbered[vertex]);
+    (used, simplices)
 }

@@ -1,11 +1,11 @@
-//! VTK's `.vtu`: unstructured grids of triangles or tetrahedra, in whatever encoding, through [`crate::volume::vtk`].
+//! VTK's `.vtu`: unstructured grids of triangles or tetrahedra, in whatever encoding, through [`crate::io::vtk`].
 //!
 //! Where a file holds cells of several kinds, those of the highest dimension count (meshers add the boundary's triangles
 //! to a solid); anything of that dimension that is no simplex is refused.
 
 use super::{Cells, FileMesh, PointArray};
 use crate::geometry::Vector64;
-use crate::volume::vtk::{self, DataSet, TETRAHEDRON, TRIANGLE, UnstructuredGrid, cell_name};
+use crate::io::vtk::{self, DataSet, TETRAHEDRON, TRIANGLE, UnstructuredGrid, cell_name};
 
 pub fn read(bytes: &[u8]) -> Result<FileMesh, String> {
     let DataSet::Unstructured(grid) = vtk::parse(bytes).map_err(|problem| problem.to_string())? else {

@@ -145,7 +145,7 @@ fn buffer(values: &Values) -> IOBuffer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::vtk;
+    use crate::io::vtk;
 
     fn arrays() -> Vec<Array> {
         vec![

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 use roxmltree::Node;
 
-use super::super::Problem;
+use super::Problem;
 use super::blocks::Compressor;
 
 /// A file cut in two.

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use super::{Header, Held, Image, Request, room_for};
+use crate::io::vtk;
 use crate::volume;
 
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image, String> {
     room_for(length.saturating_mul(2))?;
-    let image = volume::read(path).map_err(|error| {
+    let image = vtk::read_volume(path).map_err(|error| {
         // The error names the file, as whoever asked does.
         let text = error.to_string();
         text.strip_prefix(&format!("{}: ", path.display())).map_or(text.clone(), str::to_owned)

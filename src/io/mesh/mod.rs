@@ -1,11 +1,10 @@
 //! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu`, `.vtk` and
-//! `.msh`. And [`image`]s.
+//! `.msh`.
 //!
 //! A file is read whole, so that declared sizes can be held against its length before anything is allocated. Whatever
 //! it holds, the answer is a mesh whose indices are within range and whose coordinates are finite, or an error that
 //! names the file and what is wrong with it. Orientation is that of the vertices' order; normals of STL files are ignored.
 
-pub mod image;
 mod msh;
 mod obj;
 mod ply;
@@ -13,13 +12,8 @@ mod stl;
 mod vtk;
 mod vtu;
 
-use std::path::{Path, PathBuf};
-
-use super::Error;
+use super::{Input, InputError};
 use crate::geometry::Vector64;
-
-/// Characters of a message about a file.
-const LONGEST_MESSAGE: usize = 500;
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +48,7 @@ pub struct PointArray {
 
 impl FileMesh {
     /// The array with this name, one vector a point, if it has D components and finite values.
-    pub fn vectors<const D: usize>(&self, name: &str, input: &Input) -> Result<Option<Vec<Vector64<D>>>, Error> {
+    pub fn vectors<const D: usize>(&self, name: &str, input: &Input) -> Result<Option<Vec<Vector64<D>>>, InputError> {
         let Some(array) = self.point_arrays.iter().find(|array| array.name == name) else { return Ok(None) };
         if array.components != D || array.values.len() != D * self.points.len() {
             return Err(input.wrong(format!(
@@ -71,36 +65,9 @@ impl FileMesh {
     }
 }
 
-/// A file that an object names, and by which key.
-#[derive(Clone, Debug)]
-pub struct Input {
-    key: String,
-    path: PathBuf,
-}
-
 impl Input {
-    /// The file `path`, relative to `folder`, that the key names.
-    pub fn new(key: &str, folder: &Path, path: &Path) -> Self {
-        Self { key: key.to_owned(), path: folder.join(path) }
-    }
-
-    /// The error that the file holds something wrong.
-    pub fn wrong(&self, message: impl Into<String>) -> Error {
-        let mut message = message.into();
-        // Some readers cite what is damaged at length.
-        if let Some((end, _)) = message.char_indices().nth(LONGEST_MESSAGE) {
-            message.truncate(end);
-            message.push_str(" ...");
-        }
-        Error::Content { key: self.key.clone(), path: self.path.clone(), message }
-    }
-
-    fn unreadable(&self, source: std::io::Error) -> Error {
-        Error::Unreadable { key: self.key.clone(), path: self.path.clone(), source }
-    }
-
     /// Reads the mesh, by the ending of the file's name.
-    pub fn read(&self) -> Result<FileMesh, Error> {
+    pub fn read(&self) -> Result<FileMesh, InputError> {
         let ending = self.path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let parse = match ending.as_str() {
             "stl" => stl::read,

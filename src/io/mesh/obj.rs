@@ -3,9 +3,9 @@
 
 use std::collections::HashMap;
 
-use super::super::weld::weld;
 use super::{Cells, FileMesh};
 use crate::geometry::Vector64;
+use crate::mesh::weld::weld;
 
 pub fn read(bytes: &[u8]) -> Result<FileMesh, String> {
     let options =

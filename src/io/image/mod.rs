@@ -18,8 +18,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::Error;
-use super::Input;
+use super::{Input, InputError as Error};
 use crate::volume::{Kind, available_memory};
 
 /// The sizes and places of an image: x, y, z, time.

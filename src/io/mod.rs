@@ -1,0 +1,32 @@
+//! Files: every format in one place, reading and writing beside each other.
+//!
+//! | what | formats | where |
+//! | --- | --- | --- |
+//! | meshes read | `.stl`, `.obj`, `.ply`, `.msh`, `.vtk`, `.vtu` | [`mesh`] |
+//! | images read | `.vti`, `.raw`, `.nii`, `.tif`, `.nc`, `.nrrd` | [`image`] |
+//! | VTK's XML files read | `.vti`, `.vtu`, `.vtp` | [`vtk`] |
+//! | images written | `.vti`, `.raw`, `.png` | [`vti`], [`raw`], [`png`] |
+//! | meshes and sequences written | `.vtu`, `.pvd` | [`vtu`], [`pvd`] |
+//! | figures for ParaView written | a script that finds its images beside itself | [`paraview`] |
+//!
+//! Every writer works over any `Write`, so it can be tested in memory; [`AtomicFile`] is the one place that opens
+//! outputs, written whole or not at all. Images are written in slabs of z layers, so that an image need never be in
+//! memory as a whole. Readers trust no file: sizes are held against its length before memory is asked for.
+
+mod atomic;
+mod error;
+pub mod image;
+mod input;
+pub mod mesh;
+pub mod paraview;
+pub mod png;
+pub mod pvd;
+pub mod raw;
+pub mod vti;
+pub mod vtk;
+pub mod vtu;
+mod xml;
+
+pub use atomic::{AtomicFile, check_free_space, check_writable, free_space};
+pub use error::Error;
+pub use input::{Input, InputError};
