@@ -10,10 +10,14 @@
 //! - [`orientation`]: which components are closed, and which side of them is outside;
 //! - [`normals`]: measure-weighted vertex normals;
 //! - [`rounding`]: which simplices turn over when rounded;
+//! - [`corners`]: where the surface creases, and vertices are split so that each side has a normal of its own;
 //! - simplices of measure zero, which no ray can hit.
 
+mod approach;
 mod build;
+pub mod corners;
 mod error;
+pub mod facets;
 pub mod identity;
 mod incidence;
 mod nesting;
@@ -22,6 +26,7 @@ pub mod orientation;
 pub mod rounding;
 mod surface;
 pub mod topology;
+mod union_find;
 pub mod weld;
 
 use std::ops::Range;
@@ -30,11 +35,14 @@ use sha2::{Digest, Sha256};
 
 use crate::geometry::{Aabb, Vector};
 
+pub use approach::approach;
 pub use build::MeshBuilder;
+pub use corners::Crease;
 pub use error::MeshError;
 pub use incidence::Incidence;
 pub use orientation::{Orientation, Viewpoint};
 pub use surface::Surface;
+pub use union_find::UnionFind;
 
 /// One object of a scene: which vertices and simplices of the mesh are its own, and how it looks.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::Invalid;
 use super::plan::{CameraPlan, Plan, ProjectionPlan, SceneCounts, ScenePlan};
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
 use crate::mesh::{Mesh, MeshBuilder, Orientation};
 use crate::progress::Progress;
 use crate::render::{Camera, Projection, View};
@@ -24,8 +24,8 @@ impl AnyMesh {
     /// Whatever is wrong with an object, at the key to blame; anything if `progress` says to stop.
     pub fn build(plan: &Plan, scene: usize, notes: &mut Vec<String>, progress: &dyn Progress) -> Result<Self, Invalid> {
         match plan.scenes[scene].dimension {
-            3 => build(plan, scene, notes, progress).map(Self::Three),
-            _ => build(plan, scene, notes, progress).map(Self::Four),
+            Dimension::Three => build(plan, scene, notes, progress).map(Self::Three),
+            Dimension::Four => build(plan, scene, notes, progress).map(Self::Four),
         }
     }
 
@@ -94,7 +94,8 @@ pub fn build<const D: usize>(
             },
         };
         let color = object.color.rgb().map_err(blame)?;
-        builder.add(&name, color, &surface, open).map_err(|e| refuse("", e.to_string()))?;
+        let crease = object.crease().map_err(blame)?;
+        builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
     }
     builder.finish_watched(progress).ok_or_else(|| Invalid::new(path.clone(), "stopped"))
 }
