@@ -90,6 +90,18 @@ fn measure<const D: usize>(name: &str, pipeline: &Pipeline, mesh: Mesh<D>, longe
         };
         row("smooth", rays, points.len(), image(smooth));
     }
+    for rays in [64, 128, 256] {
+        for own in [4, 16] {
+            let auto = || {
+                let found = by_rays(rays).estimate(&*backend, &points, None, &Silent).expect("nobody cancels");
+                let mut renderer = renderer(Shading::Auto(Arc::new(found), by_rays(own)));
+                renderer.filters.push(Box::new(Denoise::new(&renderer.camera, &renderer.grid, own)));
+                renderer
+            };
+            let asked = points.len() + count * own as usize / rays as usize;
+            row(&format!("auto, {own} a voxel"), rays, asked, image(auto));
+        }
+    }
     for rays in [1, 4, 16, 64] {
         row("voxel", rays, count, image(|| renderer(Shading::Voxel(by_rays(rays)))));
         let filtered = || {
