@@ -101,7 +101,7 @@ fn main() {
     for file in files {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let pipeline = Pipeline::load(&file, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        match AnyMesh::build(&pipeline.plan, 0, &mut Vec::new()).unwrap_or_else(|error| panic!("{error}")) {
+        match AnyMesh::build(&pipeline.plan, 0, &mut Vec::new(), &Silent).unwrap_or_else(|error| panic!("{error}")) {
             AnyMesh::Three(mesh) => measure(&name, &pipeline, mesh),
             AnyMesh::Four(mesh) => measure(&name, &pipeline, mesh),
         }
