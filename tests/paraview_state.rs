@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use ao4d::io::paraview::{Axis, Cut, Figure, Panel, Source, state};
+use ao4d::io::paraview::{Axis, ColorBy, Cut, Figure, Panel, Source, Style, state};
 use ao4d::volume::Grid;
 
 /// A small image: its grid, and the colour of each voxel, none where there is nothing.
@@ -95,6 +95,9 @@ fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
         cut: Cut::Octant { corner: None },
         screenshot: Some("figure.png".into()),
         size: Some([800, 500]),
+        style: Style::Voxels,
+        color_by: ColorBy::Rgba,
+        colorbar: false,
     }
 }
 
