@@ -230,8 +230,8 @@ def make_view(name, parallel):
     return v
 
 
-def place_camera(v, bounds, aspect, room):
-    """Moves back along CAMERA until the box fills the view below `room`, the share that the caption takes."""
+def place_camera(v, bounds, aspect, above, below=0.0):
+    """Moves back along CAMERA until the box fills the view between the shares above and below it, left to text."""
     length = math.sqrt(CAMERA[0] ** 2 + CAMERA[1] ** 2 + CAMERA[2] ** 2)
     back = [c / length for c in CAMERA]
     right = [back[2] / math.hypot(back[0], back[2]), 0.0, -back[0] / math.hypot(back[0], back[2])]
@@ -249,10 +249,10 @@ def place_camera(v, bounds, aspect, room):
     for _ in range(20):
         seen = [[c[a] / ((away - c[2]) * slope) for c in corners] for a in range(2)]
         box = [f(values) for values in seen for f in (smallest, largest)]
-        grow = largest((box[1] - box[0]) / (1.86 * aspect), (box[3] - box[2]) / (1.9 - 2.0 * room))
+        grow = largest((box[1] - box[0]) / (1.86 * aspect), (box[3] - box[2]) / (1.9 - 2.0 * (above + below)))
         away *= grow
         shift = [(box[0] + box[1]) / 2 * slope * away / grow, (box[2] + box[3]) / 2 * slope * away / grow]
-    shift[1] += room * slope * away
+    shift[1] += (above - below) * slope * away
     target = [m + shift[0] * r + shift[1] * u for m, r, u in zip(middle, right, up)]
     setp(v, CameraViewAngle=angle, CameraFocalPoint=target, CenterOfRotation=middle, CameraViewUp=[0.0, 1.0, 0.0],
          CameraPosition=[t + away * b for t, b in zip(target, back)], CameraParallelScale=slope * away)
@@ -265,16 +265,16 @@ def show_bar(v):
     bar = GetScalarBar(GetColorTransferFunction('ambient_occlusion'), v)
     size = text_size()
     setp(bar, Title='ambient occlusion A', ComponentTitle='', TitleColor=TEXT, LabelColor=TEXT, TitleFontFamily='Arial',
-         LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=size, AutomaticLabelFormat=0, LabelFormat='%.2f',
-         RangeLabelFormat='%.0f', UseCustomLabels=1, CustomLabels=[0.25, 0.5, 0.75], ScalarBarThickness=size,
-         ScalarBarLength=0.3, Orientation='Vertical', HorizontalTitle=1)
+         LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0,
+         LabelFormat='%.2f', RangeLabelFormat='%.0f', UseCustomLabels=1, CustomLabels=[0.25, 0.5, 0.75],
+         ScalarBarThickness=int(0.7 * size), ScalarBarLength=0.36, Orientation='Horizontal')
     for place in ('Any Location', 'AnyLocation'):
         try:
             bar.WindowLocation = place
             break
         except ValueError:
             pass
-    setp(bar, Position=[0.84, 0.6], Visibility=1)
+    setp(bar, Position=[0.32, 0.015], Visibility=1)
 
 
 def show_caption(text, v):

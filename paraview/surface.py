@@ -4,10 +4,8 @@
 # of a voxel is covered, one an object where the file tells objects apart; what is left of them beyond the cut, a clip
 # whose box or plane may be dragged; and the smooth skin of that. The frame's edges are those behind the bodies.
 
-# The width of the kernel that smooths the skin, in voxels; and where the file says in part how far voxels are covered.
-SMOOTH, SMOOTH_PARTLY = 0.75, 0.6
-# The width of the kernel that smooths colours along the skin, in voxels. Empty voxels have no part in it.
-SMOOTH_COLOUR = 0.7
+# The width of the kernel that smooths skin and colours, in voxels. Empty voxels have no part in colours.
+SMOOTH = 0.7
 # Faces that meet at a larger angle, in degrees, meet at a sharp edge.
 EDGE_ANGLE = 40.0
 # How much of the light comes from all sides; the rest comes from above the camera. A colour map is dimmed less.
@@ -41,7 +39,6 @@ if number is None:
 values = [colours[..., k] for k in range(3)]
 if occlusion is not None:
     values.append(occlusion)
-partly = bool(((opacity > 0.01) & (opacity < 0.99)).any())
 
 # One layer more on each side, half a voxel away and equal to the last: a body that goes on beyond the image is cut
 # off by its border, flat.
@@ -95,11 +92,11 @@ for one in numpy.unique(number[opacity > 0]):
         around.append(slice(int(numpy.maximum(filled[0] - 4, 0)), int(filled[-1]) + 5))
     around = tuple(around)
     covered = numpy.where(of_it[around], opacity[around], numpy.float32(0))
-    skin = blurred(covered, SMOOTH_PARTLY if partly else SMOOTH)
+    smooth = blurred(covered, SMOOTH)
     # What is less than two voxels thick would be lost: it stays as it is.
-    skin = numpy.where(thin(covered >= 0.5), numpy.maximum(skin, covered), skin)
-    weight = numpy.maximum(blurred(covered, SMOOTH_COLOUR), 1e-6)
-    spread = [blurred(covered * v[around], SMOOTH_COLOUR) / weight for v in values]
+    skin = numpy.where(thin(covered >= 0.5), numpy.maximum(smooth, covered), smooth)
+    weight = numpy.maximum(smooth, 1e-6)
+    spread = [blurred(covered * v[around], SMOOTH) / weight for v in values]
 
     # Cropped to the object, with the border's layers where the image ends.
     at = [(around[2 - axis].start, int(numpy.minimum(around[2 - axis].stop, shape[2 - axis]))) for axis in range(3)]
@@ -115,7 +112,7 @@ for one in numpy.unique(number[opacity > 0]):
     add_array(grid, 'rgb', numpy.clip(three + 0.5, 0, 255).astype(numpy.uint8))
     if occlusion is not None:
         add_array(grid, 'ambient_occlusion', closed(spread[3]))
-    add_array(grid, 'object', numpy.full(skin.size and closed(skin).size, one, numpy.int32))
+    add_array(grid, 'object', numpy.full(closed(skin).size, one, numpy.int32))
     grid.GetPointData().SetActiveScalars('covered')
     solid = vtkTableBasedClipDataSet()
     solid.SetInputData(grid)
@@ -139,7 +136,7 @@ def bodies_of(reader, name):
     f.OutputDataSetType = 'vtkUnstructuredGrid'
     f.CopyArrays = 0
     f.RequestUpdateExtentScript = BODIES_REQUEST
-    f.Script = 'SMOOTH, SMOOTH_PARTLY, SMOOTH_COLOUR = %r, %r, %r\n' % (SMOOTH, SMOOTH_PARTLY, SMOOTH_COLOUR) + BODIES_GRID
+    f.Script = 'SMOOTH = %r\n' % SMOOTH + BODIES_GRID
     return f
 
 
@@ -176,9 +173,9 @@ def link_cuts(clips):
 def smooth_skin(solid, name):
     skin = ExtractSurface(registrationName=name + ': skin', Input=solid)
     make = globals().get('SurfaceNormals') or GenerateSurfaceNormals
-    smooth = make(registrationName=name + ': smooth skin', Input=skin)
-    setp(smooth, FeatureAngle=EDGE_ANGLE, Splitting=1, Consistency=1)
-    return smooth
+    normals = make(registrationName=name + ': smooth skin', Input=skin)
+    setp(normals, FeatureAngle=EDGE_ANGLE, Splitting=1, Consistency=1)
+    return normals
 
 
 def frame_of(solids):
@@ -227,6 +224,6 @@ def show_solids(panels, readers, arrays, views, centre, shape):
         setp(light, Coords='Camera', Type='Directional', Position=[-0.25, 0.6, 1.0], FocalPoint=[0.0, 0.0, 0.0],
              Intensity=1.0, DiffuseColor=[1.0, 1.0, 1.0])
         show_frame(box, labels, v)
-        place_camera(v, box, shape, 0.05)
+        place_camera(v, box, shape, 0.05, 0.06 if COLORBAR else 0.0)
 
 
