@@ -100,6 +100,8 @@ pub enum Method {
     Exact,
     /// As the thesis published it, slips and all, for its figures.
     AsPublished,
+    /// As the thesis's program did it, which is not what its text says, for its figures.
+    AsProgrammed,
 }
 
 /// An image of a scene: a volume of voxels in 4D, a picture in 3D.
