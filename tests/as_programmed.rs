@@ -8,7 +8,7 @@ use ao4d::occlusion::exact::{Budget, Hemisphere};
 use ao4d::occlusion::{Estimator, ProgramDeviations};
 use ao4d::progress::Silent;
 use ao4d::trace::cpu::CpuBackend;
-use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
+use ao4d::trace::{Sampling, ShadingPoint};
 
 /// The vertices that the program held, of the scene of Figs. 5.1 and 5.2.
 const VERTICES: [[f64; 4]; 8] = [
@@ -62,19 +62,44 @@ fn print(what: &str, occlusion: &[f64]) {
 
 #[test]
 fn the_first_tetrahedron_is_dark_and_the_second_not_occluded_at_all() {
+    let truth = exact(scene());
     let mut deviations = ProgramDeviations::PROGRAMMED;
     let written = programmed(scene(), deviations, 1);
-    print("as written", &written);
-    let truth = exact(scene());
+    print("the program as written", &written);
+    let fused = programmed(scene(), ProgramDeviations { contracted: true, ..deviations }, 1);
+    print("products fused into sums", &fused);
+    // Whatever the rounding: dark, and not occluded at all.
+    for occlusion in [&written, &fused] {
+        assert!(mean(&occlusion[..4]) > 0.6, "{occlusion:?}");
+        assert_eq!(occlusion[4..], [0.0; 4]);
+    }
+    assert!((mean(&written[..4]) - 0.987).abs() < 0.005, "{written:?}");
+
     deviations.first_simplex_only = false;
     let both = programmed(scene(), deviations, 1);
     print("the return moved out of the loop", &both);
+    assert!(mean(&both[..4]) > 0.6 && mean(&both[4..]) > 0.6, "{both:?}");
     deviations.points_as_directions = false;
     let directions = programmed(scene(), deviations, 1);
     print("and directions from the vertex", &directions);
+    assert!(mean(&directions[..4]) > 0.6 && mean(&directions[4..]) > 0.6, "{directions:?}");
     deviations.hits_behind = false;
     let ahead = programmed(scene(), deviations, 1);
     print("and only hits ahead count", &ahead);
-    print("all of it mended", &programmed(scene(), ProgramDeviations::NONE, 1));
+    let mended = programmed(scene(), ProgramDeviations::NONE, 1);
+    print("and cosine-weighted directions", &mended);
     print("truth, in closed form", &truth);
+    for (k, &truth) in truth.iter().enumerate() {
+        assert!((ahead[k] - truth).abs() < 0.006, "vertex {k}: {} {truth}", ahead[k]);
+        assert!((mended[k] - truth).abs() < 0.004, "vertex {k}: {} {truth}", mended[k]);
+    }
+}
+
+#[test]
+fn values_depend_on_the_seed_alone() {
+    let values = |seed| programmed(scene(), ProgramDeviations::PROGRAMMED, seed);
+    assert_eq!(values(1), values(1));
+    assert_ne!(values(1), values(2));
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(one.install(|| values(1)), values(1));
 }

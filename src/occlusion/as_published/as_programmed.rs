@@ -44,6 +44,9 @@ pub struct ProgramDeviations {
     pub small_determinants_miss: bool,
     /// Angles are drawn uniformly, and there is no cosine. Without it directions are cosine-weighted.
     pub uniform_angles: bool,
+    /// Products are fused into sums, as OpenCL compilers may. Not a deviation of the program's source, but it decides how much
+    /// of a vertex its own simplex hides.
+    pub contracted: bool,
 }
 
 impl ProgramDeviations {
@@ -54,6 +57,7 @@ impl ProgramDeviations {
         hits_behind: true,
         small_determinants_miss: true,
         uniform_angles: true,
+        contracted: false,
     };
 
     /// All deviations taken back.
@@ -63,6 +67,7 @@ impl ProgramDeviations {
         hits_behind: false,
         small_determinants_miss: false,
         uniform_angles: false,
+        contracted: false,
     };
 }
 
@@ -131,13 +136,13 @@ impl<'t, const D: usize> AsProgrammed<'t, D> {
         let right = origin - corners[0];
         let mut columns: [Vector<D>; D] =
             std::array::from_fn(|i| if i == 0 { -direction } else { corners[i] - corners[0] });
-        let denominator = laplace(&columns, false);
+        let denominator = laplace(&columns, self.deviations.contracted);
         if denominator == 0.0 || self.deviations.small_determinants_miss && denominator.abs() < FLAT {
             return false;
         }
         let solution: [f32; D] = std::array::from_fn(|i| {
             let column = std::mem::replace(&mut columns[i], right);
-            let numerator = laplace(&columns, false);
+            let numerator = laplace(&columns, self.deviations.contracted);
             columns[i] = column;
             numerator / denominator
         });

@@ -3,7 +3,7 @@
 use super::resolve::Resolver;
 use super::{MAX_DIMENSION, NO_SCENE, OcclusionSource, RenderPlan, StageRef, camera};
 use crate::pipeline::error::Invalid;
-use crate::pipeline::spec::{Method, RenderSpec, Shading};
+use crate::pipeline::spec::{RenderSpec, Shading};
 
 pub(super) fn render(
     resolver: &mut Resolver,
