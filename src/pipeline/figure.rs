@@ -3,7 +3,7 @@
 use super::build::camera;
 use super::files::{PROGRAM, beside, holds, paraview, write_whole};
 use super::plan::{FigurePlan, Plan};
-use super::spec::Reader;
+use super::spec::{ColorBy, Reader, Style};
 use super::{Axis, Cut, RunError};
 use crate::geometry::Dimension;
 use crate::volume::Grid;
@@ -58,6 +58,15 @@ pub(super) fn write(plan: &Plan, figure: &FigurePlan, force: bool) -> Result<(u6
         },
         screenshot: figure.screenshot.as_ref().map(|s| beside(&figure.state, s)),
         size: figure.size,
+        style: match figure.style {
+            Style::Surface => paraview::Style::Surface,
+            Style::Voxels => paraview::Style::Voxels,
+        },
+        color_by: match figure.color_by {
+            ColorBy::Rgba => paraview::ColorBy::Rgba,
+            ColorBy::AmbientOcclusion => paraview::ColorBy::AmbientOcclusion,
+        },
+        colorbar: figure.colorbar,
     });
     let path = plan.out.join(&figure.state);
     let cached = !force && holds(&path, state.as_bytes());

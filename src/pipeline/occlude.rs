@@ -6,7 +6,7 @@ use super::plan::{Computation, OcclusionPlan, OcclusionSource, Samples};
 use super::prepare::{Loaded, errors_path, read_values};
 use super::spec;
 use crate::occlusion::exact::Budget;
-use crate::occlusion::{Deviations, Estimates, Estimator};
+use crate::occlusion::{Deviations, Estimates, Estimator, ProgramDeviations};
 use crate::trace::{Sampler, Sampling, Target};
 
 /// What computes a computation's values.
@@ -26,6 +26,7 @@ pub(super) fn estimator(computation: &Computation) -> Estimator {
     match computation.method {
         spec::Method::Adaptive => Estimator::Adaptive(sampling),
         spec::Method::AsPublished => Estimator::AsPublished(sampling, Deviations::PUBLISHED),
+        spec::Method::AsProgrammed => Estimator::AsProgrammed(sampling, ProgramDeviations::PROGRAMMED),
         _ => Estimator::Sampled(sampling),
     }
 }

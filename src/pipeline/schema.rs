@@ -70,6 +70,8 @@ mod tests {
             ("Encoding", decoder_knows::<Encoding>("zzz")),
             ("Compression", decoder_knows::<Compression>("zzz")),
             ("Reader", decoder_knows::<Reader>("zzz")),
+            ("Style", decoder_knows::<Style>("zzz")),
+            ("ColorBy", decoder_knows::<ColorBy>("zzz")),
             ("Axis", decoder_knows::<Axis>("zzz")),
         ] {
             assert!(!known.is_empty(), "{name}");

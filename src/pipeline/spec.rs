@@ -100,6 +100,8 @@ pub enum Method {
     Exact,
     /// As the thesis published it, slips and all, for its figures.
     AsPublished,
+    /// As the thesis's program did it, which is not what its text says, for its figures.
+    AsProgrammed,
 }
 
 /// An image of a scene: a volume of voxels in 4D, a picture in 3D.
@@ -230,8 +232,36 @@ pub struct ParaviewSpec {
     pub reader: Option<Reader>,
     /// How the volumes are cut open (default `none`).
     pub cut: Option<super::cut::Cut>,
-    /// Width and height of the picture in pixels (default: 800 across for each image).
+    /// Width and height of the picture in pixels (default: 3200 across in all; with `style: voxels` 800 for each image).
     pub size: Option<Vec<u64>>,
+    /// How volumes are drawn (default `surface`).
+    pub style: Option<Style>,
+    /// What gives the colours (default `rgba`).
+    pub color_by: Option<ColorBy>,
+    /// Whether a colour bar of ambient occlusion stands in the last panel (default: with `color_by: ambient_occlusion`).
+    pub colorbar: Option<bool>,
+}
+
+/// How a figure draws volumes.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Style {
+    /// Bodies with smooth skins, for print.
+    #[default]
+    Surface,
+    /// Voxels as boxes, and slices below.
+    Voxels,
+}
+
+/// What gives a figure its colours.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ColorBy {
+    /// The image's colours, darkened by ambient occlusion.
+    #[default]
+    Rgba,
+    /// Ambient occlusion alone, by a colour map that is even to the eye.
+    AmbientOcclusion,
 }
 
 /// Which files a state reads.

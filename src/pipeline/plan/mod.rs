@@ -29,7 +29,8 @@ pub use describe::{Description, SceneCounts, grouped, size};
 
 use super::Cut;
 use super::error::Invalid;
-use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading, Visibility};
+use super::spec::{Channel, ColorBy, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading};
+use super::spec::{Style, Visibility};
 use crate::geometry::Dimension;
 /// The most samples a vertex.
 pub const MAX_SAMPLES: u64 = 1 << 24;
@@ -289,6 +290,9 @@ pub struct WritePlan {
     pub png: Option<PathBuf>,
     /// What the image data holds, in this order.
     pub arrays: Vec<Channel>,
+    /// Whether the pipeline says which; else figures may add what they need.
+    #[serde(skip)]
+    pub arrays_given: bool,
     /// How it stores numbers.
     pub encoding: Encoding,
     /// How it packs them.
@@ -322,4 +326,10 @@ pub struct FigurePlan {
     pub cut: Cut,
     /// Width and height of the picture in pixels, where they were given.
     pub size: Option<[u32; 2]>,
+    /// How it draws volumes.
+    pub style: Style,
+    /// What gives the colours.
+    pub color_by: ColorBy,
+    /// Whether it has a colour bar.
+    pub colorbar: bool,
 }

@@ -132,8 +132,9 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
     } else {
         samples
     };
-    if method == Method::AsPublished && spec.target_error.is_some() {
-        return refuse("target_error", "`as_published` aims at no error, which it doesn't know; give `samples`".into());
+    if method.is_of_the_thesis() && spec.target_error.is_some() {
+        let method = method.as_str();
+        return refuse("target_error", format!("`{method}` aims at no error, which it doesn't know; give `samples`"));
     }
     let max_cones = match spec.max_cones {
         None => exact::Budget::default().cones as u64,
@@ -143,7 +144,7 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
     if spec.max_cones.is_some() && method != Method::Exact {
         resolver.warn(format!("{path}.max_cones"), "has no effect without `method: exact`");
     }
-    if spec.max_distance.is_some() && matches!(method, Method::Exact | Method::Adaptive) {
+    if spec.max_distance.is_some() && matches!(method, Method::Exact | Method::Adaptive | Method::AsProgrammed) {
         let method = method.as_str();
         return refuse(
             "max_distance",
@@ -164,6 +165,12 @@ impl Method {
             Method::Adaptive => "adaptive",
             Method::Exact => "exact",
             Method::AsPublished => "as_published",
+            Method::AsProgrammed => "as_programmed",
         }
+    }
+
+    /// Whether it is there for the thesis's figures alone.
+    pub fn is_of_the_thesis(self) -> bool {
+        matches!(self, Method::AsPublished | Method::AsProgrammed)
     }
 }

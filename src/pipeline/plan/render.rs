@@ -4,7 +4,7 @@ use super::resolve::Resolver;
 use super::{MAX_DIMENSION, NO_SCENE, OcclusionSource, RenderPlan, StageRef, camera};
 use crate::geometry::Dimension;
 use crate::pipeline::error::Invalid;
-use crate::pipeline::spec::{Method, RenderSpec, Shading};
+use crate::pipeline::spec::{RenderSpec, Shading};
 
 pub(super) fn render(
     resolver: &mut Resolver,
@@ -23,12 +23,13 @@ pub(super) fn render(
         let message = "`voxel` computes occlusion at the visible points, which a loaded file has no values for";
         return Err(Invalid::new(format!("{path}.shading"), message));
     }
-    let published = |o: usize| match &resolver.plan.occlusions[o].source {
-        OcclusionSource::Compute(computation) => computation.method == Method::AsPublished,
-        OcclusionSource::Load(_) => false,
+    let of_the_thesis = |o: usize| match &resolver.plan.occlusions[o].source {
+        OcclusionSource::Compute(computation) => Some(computation.method).filter(|m| m.is_of_the_thesis()),
+        OcclusionSource::Load(_) => None,
     };
-    if shading == Shading::Voxel && occlusion.is_some_and(published) {
-        let message = "`as_published` has values at vertices only; take `flat`, as the thesis did";
+    if let (Shading::Voxel, Some(method)) = (shading, occlusion.and_then(of_the_thesis)) {
+        let method = method.as_str();
+        let message = format!("`{method}` has values at vertices only; take `flat`, as the thesis did");
         return Err(Invalid::new(format!("{path}.shading"), message));
     }
     resolver.plan.scenes[scene].eye.get_or_insert_with(|| camera.eye.clone());

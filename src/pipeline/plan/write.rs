@@ -5,7 +5,7 @@ use super::resolve::Resolver;
 use super::{FigurePlan, Plan, StageRef, WritePlan};
 use crate::pipeline::Cut;
 use crate::pipeline::error::Invalid;
-use crate::pipeline::spec::{Channel, ParaviewSpec, Reader, WriteSpec};
+use crate::pipeline::spec::{Channel, ColorBy, ParaviewSpec, Reader, Style, WriteSpec};
 
 pub(super) fn write(resolver: &mut Resolver, path: &str, id: String, spec: &WriteSpec) -> Result<WritePlan, Invalid> {
     let render = match &spec.input {
@@ -54,7 +54,8 @@ pub(super) fn write(resolver: &mut Resolver, path: &str, id: String, spec: &Writ
     needed.dedup();
     resolver.plan.renders[render].arrays = needed;
     let (encoding, compression) = (spec.encoding.unwrap_or_default(), spec.compression.unwrap_or_default());
-    Ok(WritePlan { id, path: path.to_owned(), render, vti, raw, vtu, png, arrays, encoding, compression })
+    let arrays_given = spec.arrays.is_some();
+    Ok(WritePlan { id, path: path.to_owned(), render, vti, raw, vtu, png, arrays, arrays_given, encoding, compression })
 }
 
 pub(super) fn figure(
@@ -104,6 +105,14 @@ pub(super) fn figure(
             }
         }
     }
+    let (style, color_by) = (spec.style.unwrap_or_default(), spec.color_by.unwrap_or_default());
+    if color_by == ColorBy::AmbientOcclusion {
+        check_occlusion(resolver, path, reader, &writes)?;
+    }
+    if style == Style::Surface && reader == Reader::Vti {
+        writes.iter().for_each(|&w| add_object(resolver, w));
+    }
+    let colorbar = spec.colorbar.unwrap_or(color_by == ColorBy::AmbientOcclusion);
     let state = resolver.outputs.claim(&format!("{path}.state"), &spec.state, Some("py"))?;
     let screenshot = match &spec.screenshot {
         Some(name) => Some(resolver.outputs.claim(&format!("{path}.screenshot"), name, Some("png"))?),
@@ -128,7 +137,42 @@ pub(super) fn figure(
     if let Cut::Plane(plane) = cut {
         check_length(&format!("{path}.cut.at"), plane.at)?;
     }
-    Ok(FigurePlan { id, path: path.to_owned(), writes, state, screenshot, reader, cut, size })
+    let path = path.to_owned();
+    Ok(FigurePlan { id, path, writes, state, screenshot, reader, cut, size, style, color_by, colorbar })
+}
+
+/// A figure can colour by ambient occlusion only what its files hold.
+fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[usize]) -> Result<(), Invalid> {
+    let key = format!("{path}.color_by");
+    if reader == Reader::Raw {
+        let message = "`.raw` files hold colours alone, no ambient occlusion; take `reader: vti`, or `color_by: rgba`";
+        return Err(Invalid::new(key, message));
+    }
+    for &w in writes {
+        let write = &resolver.plan.writes[w];
+        if !write.arrays.contains(&Channel::AmbientOcclusion) {
+            let message = format!("`{}` has no ambient_occlusion; add it to its `arrays`", write.id);
+            return Err(Invalid::new(key, message));
+        }
+    }
+    Ok(())
+}
+
+/// Of several objects each gets a skin of its own, so the file has to tell which voxel is whose, unless it was said what
+/// it holds.
+fn add_object(resolver: &mut Resolver, write: usize) {
+    let plan = &mut resolver.plan;
+    let write = &mut plan.writes[write];
+    let render = &mut plan.renders[write.render];
+    let volume = render.dimensions[2] > 1;
+    let several = plan.scenes[render.scene].objects.len() > 1;
+    if volume && several && !write.arrays_given && !write.arrays.contains(&Channel::Object) {
+        write.arrays.push(Channel::Object);
+        if !render.arrays.contains(&Channel::Object) {
+            render.arrays.push(Channel::Object);
+            render.arrays.sort_unstable();
+        }
+    }
 }
 
 /// What can be said only when all stages are known.
