@@ -77,7 +77,7 @@ fn mutate(text: &str, random: &mut Random) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Gives damaged texts to a reader until the time is over; prints and returns how many it read and refused.
+/// Gives damaged texts to a reader until the time is over, and prints how many it read and refused.
 fn look<E: std::fmt::Display>(
     what: &str,
     texts: &[String],
