@@ -229,7 +229,7 @@ fn every_pipelines_pictures() {
         let pipeline = Pipeline::load(&file, &[], None).unwrap();
         let mut seen = 0;
         for scene in 0..pipeline.plan.scenes.len() {
-            seen += match AnyMesh::build(&pipeline.plan, scene, &mut Vec::new()).unwrap() {
+            seen += match AnyMesh::build(&pipeline.plan, scene, &mut Vec::new(), &Silent).unwrap() {
                 AnyMesh::Three(mesh) => pipeline_scene(&name, &pipeline, scene, &mesh),
                 AnyMesh::Four(mesh) => pipeline_scene(&name, &pipeline, scene, &mesh),
             };
