@@ -27,4 +27,5 @@ pub mod pipeline;
 pub mod progress;
 pub mod render;
 pub mod scene;
+pub mod stages;
 pub mod volume;

@@ -10,7 +10,8 @@ const FLOORS: &[&[&str]] = &[
     &["scene", "accel"],
     &["occlusion"],
     &["render"],
-    &["inspect", "pipeline"],
+    &["inspect", "stages"],
+    &["pipeline"],
 ];
 
 fn floor(module: &str) -> usize {

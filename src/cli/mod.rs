@@ -17,6 +17,7 @@ mod watch;
 use std::path::Path;
 use std::process::ExitCode;
 
+use ao4d::pipeline::RunError;
 use clap::{Parser, Subcommand};
 
 use console::Console;
@@ -78,6 +79,16 @@ impl Failure {
 impl From<ao4d::pipeline::Error> for Failure {
     fn from(error: ao4d::pipeline::Error) -> Self {
         Failure::Refused(Box::new(error))
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Refused(error) => Failure::Refused(Box::new(error)),
+            RunError::Cancelled(_) => Failure::Cancelled,
+            error => Failure::Failed(Box::new(error)),
+        }
     }
 }
 

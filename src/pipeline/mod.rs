@@ -1,7 +1,7 @@
 //! From YAML to work: what a user wrote is read, checked and resolved before anything runs.
 //!
 //! Two types stand for the two halves. [`spec`] is the pipeline as written: keys and values, nothing looked up.
-//! [`plan`] is the pipeline as understood: every stage knows by index what it works on, every default is filled in,
+//! [`Plan`] is the pipeline as understood: every stage knows by index what it works on, every default is filled in,
 //! every range checked, every file named once. The way from one to the other refuses whatever can be refused without
 //! running, with file, line and the nearest right word, so that `ao4d check` and `ao4d run` refuse the same things.
 //!
@@ -10,38 +10,28 @@
 //!                  \________________ lines _________________/
 //! ```
 
-mod build;
+mod book;
 mod cache;
-mod cut;
 mod document;
 mod error;
-mod figure;
-mod files;
-mod limits;
-mod occlude;
-mod one_or_many;
+mod lock;
 pub mod overrides;
-pub mod plan;
-mod prepare;
+mod pool;
 mod report;
 mod run;
 mod schema;
 mod settings;
 pub mod spec;
 mod study;
-mod suggest;
-mod work;
 mod yaml;
 
 use std::path::{Path, PathBuf};
 
-pub use build::{AnyMesh, camera};
-pub use cut::{Axis, Cut, Plane};
+use crate::stages::prepare::Prepared;
+use crate::stages::{Invalid, Plan, suggest};
+
 pub use document::Document;
-pub use error::{Error, Invalid, Place, Refusal};
-pub use one_or_many::OneOrMany;
-pub use plan::Plan;
-pub use prepare::{Loaded, Prepared};
+pub use error::{Error, Place, Refusal};
 pub use report::{FileReport, Report, StageTime};
 pub use run::{RunError, run};
 pub use schema::schema;
@@ -70,12 +60,61 @@ impl Pipeline {
             document.set(assignment)?;
         }
         let spec: spec::PipelineSpec = document.decode()?;
-        let plan = Plan::new(&spec, document.folder(), out).map_err(|invalid| document.refuse(invalid))?;
+        let (seed, folder) = (spec.seed.unwrap_or(0), document.folder());
+        let plan = Plan::new(&spec.name, seed, &spec.stages, folder, out);
+        let plan = plan.map_err(|invalid| document.refuse(invalid))?;
         Ok(Pipeline { plan, document })
+    }
+
+    /// Builds the scenes for which `wanted` says so, and reads the occlusion files that are loaded into them and wanted
+    /// too; both by their places in the plan.
+    ///
+    /// # Errors
+    /// Whatever is wrong with an object or a file, with the line that asked for it.
+    pub fn prepare(&self, wanted: impl Fn(usize) -> bool) -> Result<Prepared, Error> {
+        self.guard_inputs()?;
+        self.plan.prepare(wanted).map_err(|invalid| self.document.refuse(invalid))
+    }
+
+    /// Refuses a pipeline one of whose files would take the place of one that it reads.
+    fn guard_inputs(&self) -> Result<(), Error> {
+        let plan = &self.plan;
+        let mut inputs = vec![(PathBuf::from(self.document.file()), "the pipeline itself".to_owned())];
+        for (index, stage) in plan.stages.iter().enumerate() {
+            inputs
+                .extend(plan.input_files(index).into_iter().map(|file| (file, format!("an input of {}", stage.path))));
+        }
+        let inputs: Vec<_> =
+            inputs.iter().flat_map(|(file, what)| places(file).map(move |place| (place, what))).collect();
+        for (index, stage) in plan.stages.iter().enumerate() {
+            for file in plan.all_files_of(index) {
+                let Some(place) = place(&plan.out.join(&file)) else { continue };
+                if let Some((_, what)) = inputs.iter().find(|(input, _)| *input == place) {
+                    let message = format!(
+                        "\"{}\" in {} would replace {what}; give it another name, or write elsewhere with --out",
+                        file.display(),
+                        plan.out.display()
+                    );
+                    return Err(self.document.refuse(Invalid::new(&stage.path, message)));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// What is allowed but probably not meant, each with its place.
     pub fn warnings(&self) -> impl Iterator<Item = Error> {
         self.plan.warnings.iter().map(|warning| self.document.refuse(warning.clone()))
     }
+}
+
+/// Where a name is in the end: its folder without links, and itself. None if there is no such folder.
+fn place(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Some(folder.canonicalize().ok()?.join(path.file_name()?))
+}
+
+/// The names that lead to an input: its own, and that of the file behind it if it is a link.
+fn places(path: &Path) -> impl Iterator<Item = PathBuf> {
+    place(path).into_iter().chain(path.canonicalize().ok())
 }

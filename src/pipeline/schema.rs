@@ -17,8 +17,17 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::pipeline::spec::*;
-    use crate::pipeline::{Axis, Plane, yaml};
+    use crate::pipeline::yaml;
+    use crate::render::Channel;
+    use crate::scene::ObjectSpec;
+    use crate::stages::StageSpec;
+    use crate::stages::camera::{CameraSpec, Projection};
+    use crate::stages::cut::{Axis, Plane};
+    use crate::stages::occlusion::{Method, OcclusionSpec};
+    use crate::stages::paraview::{ParaviewSpec, Reader};
+    use crate::stages::render::{RenderSpec, Shading};
+    use crate::stages::scene::SceneSpec;
+    use crate::stages::write::{Compression, Encoding, WriteSpec};
 
     /// The words that the decoder proposes where it meets one that nobody would use.
     fn decoder_knows<T: DeserializeOwned>(text: &str) -> BTreeSet<String> {

@@ -21,13 +21,18 @@ mod tables;
 
 use std::path::PathBuf;
 
-use super::build::AnyMesh;
-use super::files::write_whole;
-use super::plan::{OcclusionSource, grouped};
-use super::{Invalid, Pipeline, RunError, Settings};
+use super::lock::Lock;
+use super::{Pipeline, RunError, Settings};
 use crate::accel::Tracer;
 use crate::mesh::Mesh;
 use crate::progress::Progress;
+use crate::stages::Invalid;
+use crate::stages::Ref;
+use crate::stages::describe::grouped;
+use crate::stages::occlusion::{OcclusionPlan, OcclusionSource};
+use crate::stages::render::RenderPlan;
+use crate::stages::scene::{AnyMesh, ScenePlan};
+use crate::stages::write::write_whole;
 use ladder::{Bench, Rung, Truth};
 use pictures::Pictures;
 use precision::{Differing, SlipEffect};
@@ -65,20 +70,19 @@ impl Study {
 /// # Errors
 /// [`RunError::Refused`] if there is no occlusion, or nothing in its scene; else as [`super::run`].
 pub fn study(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Study, RunError> {
-    let threads = settings.threads.map_or(0, std::num::NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    pool.install(|| study_here(pipeline, progress))
+    settings.pool()?.install(|| study_here(pipeline, progress))
 }
 
 fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, RunError> {
     let plan = &pipeline.plan;
     let refuse = |path: &str, message: &str| RunError::Refused(pipeline.document.refuse(Invalid::new(path, message)));
-    let Some(occlusion) = plan.occlusions.first() else {
+    let Some((stage, occlusion)) = plan.all::<OcclusionPlan>().next() else {
         return Err(refuse("stages", "there is no `occlusion` to study; add one after the scene"));
     };
-    progress.begin("scene", 0);
-    let prepared = pipeline.prepare(|scene| scene == occlusion.scene);
-    progress.end();
+    let _lock = Lock::take(&plan.out)?;
+    let running = progress.stage("scene", 0);
+    let prepared = pipeline.prepare(|stage| stage == occlusion.scene.index());
+    running.end();
     let mut notes = Vec::new();
     let mut seed = plan.seed;
     if let OcclusionSource::Compute(computation) = &occlusion.source {
@@ -87,11 +91,14 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
             notes.push("`max_distance` is left out: all methods count occluders at any distance.".to_owned());
         }
     }
-    if plan.occlusions.len() > 1 {
-        notes.push(format!("The pipeline has several occlusions; this is the scene of the first, `{}`.", occlusion.id));
+    if plan.all::<OcclusionPlan>().count() > 1 {
+        notes.push(format!(
+            "The pipeline has several occlusions; this is the scene of the first, `{}`.",
+            plan.id(stage)
+        ));
     }
-    let empty = || refuse(&plan.scenes[occlusion.scene].path, "the scene is empty: there is no occlusion to study");
-    let mut study = match prepared?.meshes.swap_remove(occlusion.scene) {
+    let empty = || refuse(plan.path(occlusion.scene), "the scene is empty: there is no occlusion to study");
+    let mut study = match prepared?.meshes.swap_remove(occlusion.scene.nth()) {
         Some(AnyMesh::Three(mesh)) => of_mesh(pipeline, &mesh, occlusion.scene, seed, progress)?,
         Some(AnyMesh::Four(mesh)) => of_mesh(pipeline, &mesh, occlusion.scene, seed, progress)?,
         None => None,
@@ -111,7 +118,7 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
 fn of_mesh<const D: usize>(
     pipeline: &Pipeline,
     mesh: &Mesh<D>,
-    scene: usize,
+    scene: Ref<ScenePlan>,
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Option<Study>, RunError> {
@@ -125,8 +132,11 @@ fn of_mesh<const D: usize>(
     }
     let slips = precision::slips(&bench, &truth, progress)?;
     let differing = precision::differing(&tracer, seed, progress)?;
-    let render = pipeline.plan.renders.iter().find(|r| r.scene == scene && r.occlusion.is_some());
-    let pictures = render.map(|render| pictures::measure(&tracer, render, seed, progress)).transpose()?.flatten();
+    let render = pipeline.plan.all::<RenderPlan>().find(|(_, r)| r.scene == scene && r.occlusion.is_some());
+    let pictures = render
+        .map(|(stage, render)| pictures::measure(&tracer, pipeline.plan.id(stage), render, seed, progress))
+        .transpose()?
+        .flatten();
     Ok(Some(Study {
         name: pipeline.plan.name.clone(),
         dimension: D,

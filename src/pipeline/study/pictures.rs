@@ -10,10 +10,10 @@ use crate::accel::Tracer;
 use crate::occlusion::exact::Budget;
 use crate::occlusion::{self, Error, Method, Sampler, Settings};
 use crate::pipeline::RunError;
-use crate::pipeline::build::camera;
-use crate::pipeline::plan::RenderPlan;
 use crate::progress::{Progress, Silent};
 use crate::render::{Channel, Picture, Shading};
+use crate::stages::camera::camera;
+use crate::stages::render::RenderPlan;
 use crate::volume::{Array, Values};
 
 /// At most about so many voxels.
@@ -58,6 +58,7 @@ fn reduced(dimensions: [usize; 3]) -> [usize; 3] {
 /// Measures; none if no voxel sees anything.
 pub fn measure<const D: usize>(
     tracer: &Tracer<D>,
+    id: &str,
     render: &RenderPlan,
     seed: u64,
     progress: &dyn Progress,
@@ -114,7 +115,7 @@ pub fn measure<const D: usize>(
         add("voxel", samples, seconds, &arrays);
     }
     progress.end();
-    let pictures = Pictures { render: render.id.clone(), dimensions, seen: seen.len(), reference: name, rows };
+    let pictures = Pictures { render: id.to_owned(), dimensions, seen: seen.len(), reference: name, rows };
     Ok((pictures.seen > 0).then_some(pictures))
 }
 

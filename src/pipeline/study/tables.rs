@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::{Errors, Study, counted};
-use crate::pipeline::files::PROGRAM;
-use crate::pipeline::plan::grouped;
+use crate::stages::describe::grouped;
+use crate::stages::write::PROGRAM;
 
 /// One row a measurement. Occlusion: seconds are those of one vertex on one thread. Image: those of the whole image, values
 /// and all, on all threads.

@@ -1,7 +1,7 @@
 //! Ranges of numbers that several stages share.
 
+use super::Invalid;
 use super::MAX_LENGTH;
-use crate::pipeline::error::Invalid;
 
 /// A length above zero, of a sane size.
 pub(super) fn positive(path: &str, x: f64) -> Result<f64, Invalid> {

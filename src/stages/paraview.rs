@@ -1,0 +1,250 @@
+//! `paraview`: a ParaView state (a Python file) that shows images side by side.
+//!
+//! It works on files alone: which ones, and where in them the voxels are, is known without making any.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::camera::camera;
+use super::cut::{Axis, Cut};
+use super::describe::Counts;
+use super::range::check_length;
+use super::render::RenderPlan;
+use super::scene::ScenePlan;
+use super::write::{Format, PROGRAM, WritePlan, write_whole};
+use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError};
+use crate::io::paraview;
+use crate::render::Channel;
+use crate::volume::Grid;
+
+/// A ParaView state (a Python file) that shows images side by side.
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct ParaviewSpec {
+    /// A name for messages.
+    pub id: Option<String>,
+    /// The images, from left to right, by the id of their render or write (default: the nearest earlier write).
+    pub input: Option<OneOrMany>,
+    /// The state: `NAME.py`.
+    pub state: String,
+    /// The picture that the state writes when it is run: `NAME.png`.
+    pub screenshot: Option<String>,
+    /// Which files the state reads (default `vti`).
+    pub reader: Option<Reader>,
+    /// How the volumes are cut open (default `none`).
+    pub cut: Option<Cut>,
+    /// Width and height of the picture in pixels (default: 800 across for each image).
+    pub size: Option<Vec<u64>>,
+}
+
+/// Which files a state reads.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reader {
+    /// The `.vti`.
+    #[default]
+    Vti,
+    /// The `.raw`, as the thesis did.
+    Raw,
+}
+
+impl Reader {
+    /// The format of the files that it reads.
+    fn format(self) -> Format {
+        match self {
+            Self::Vti => Format::Vti,
+            Self::Raw => Format::Raw,
+        }
+    }
+}
+
+/// A ParaView state, as understood.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FigurePlan {
+    /// The images' files, from left to right; each has the file that `reader` reads.
+    pub writes: Vec<Ref<WritePlan>>,
+    /// The state's file, below `out`.
+    pub state: PathBuf,
+    /// The picture's.
+    pub screenshot: Option<PathBuf>,
+    /// Which files it reads.
+    pub reader: Reader,
+    /// How the volumes are cut open.
+    pub cut: Cut,
+    /// Width and height of the picture in pixels, where they were given.
+    pub size: Option<[u32; 2]>,
+}
+
+impl Stage for FigurePlan {
+    type Spec = ParaviewSpec;
+    const KIND: &'static str = "paraview";
+    const LIST: &'static str = "figures";
+    /// A state is made at once, and held against the file that is there: it needs no key.
+    const LEFT_OUT: &'static [LeftOut] = &[];
+
+    fn id(spec: &ParaviewSpec) -> Option<&str> {
+        spec.id.as_deref()
+    }
+
+    fn resolve(spec: &ParaviewSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
+        let reader = spec.reader.unwrap_or_default();
+        let writes = shown(spec, path, reader.format(), resolver)?;
+        if reader == Reader::Vti {
+            for &write in &writes {
+                let arrays = &resolver.plan[write].arrays;
+                if !arrays.contains(&Channel::Rgba) || !arrays.contains(&Channel::Opacity) {
+                    let id = resolver.plan.id(write);
+                    let message = format!("shows `{id}`, whose arrays lack rgba or opacity; add them to its `arrays`");
+                    return Err(Invalid::new(path, message));
+                }
+            }
+        }
+        let state = resolver.outputs.claim(&format!("{path}.state"), &spec.state, Some("py"))?;
+        let screenshot = match &spec.screenshot {
+            Some(name) => Some(resolver.outputs.claim(&format!("{path}.screenshot"), name, Some("png"))?),
+            None => None,
+        };
+        let size = match spec.size.as_deref() {
+            None => None,
+            Some(&[width, height]) => {
+                for (i, n) in [width, height].into_iter().enumerate() {
+                    if !(16..=16_384).contains(&n) {
+                        let message = format!("expected 16 to 16384 pixels, found {n}");
+                        return Err(Invalid::new(format!("{path}.size[{i}]"), message));
+                    }
+                }
+                Some([width as u32, height as u32])
+            }
+            Some(other) => {
+                return Err(Invalid::new(format!("{path}.size"), format!("expected [WIDTH, HEIGHT], found {other:?}")));
+            }
+        };
+        let cut = spec.cut.unwrap_or_default();
+        if let Cut::Plane(plane) = cut {
+            check_length(&format!("{path}.cut.at"), plane.at)?;
+        }
+        Ok(Self { writes, state, screenshot, reader, cut, size })
+    }
+
+    fn works_on(&self) -> Vec<usize> {
+        self.writes.iter().map(|write| write.index()).collect()
+    }
+
+    fn scene(_: Ref<Self>, _: &Plan) -> Option<Ref<ScenePlan>> {
+        None
+    }
+
+    fn files(&self) -> Vec<&Path> {
+        std::iter::once(&self.state).chain(&self.screenshot).map(PathBuf::as_path).collect()
+    }
+
+    fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
+        let figure = &plan[me];
+        let writes: Vec<&str> = figure.writes.iter().map(|&write| plan.id(write)).collect();
+        let picture = figure.screenshot.iter().map(|file| format!(", {}", file.display()));
+        format!("{} -> {}{}", writes.join(", "), figure.state.display(), picture.collect::<String>())
+    }
+
+    /// Writes the state, if it isn't there already.
+    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
+        let (plan, figure) = (run.plan, &run.plan[me]);
+        let state = state(plan, figure)?;
+        let path = plan.out.join(&figure.state);
+        let unchanged = !run.force && holds(&path, state.as_bytes());
+        if !unchanged {
+            write_whole(&path, state.as_bytes())?;
+        }
+        let bytes = state.len() as u64;
+        run.ledger.record(Made { file: &figure.state, bytes, notes: Vec::new(), named: true, unchanged })?;
+        Ok(String::new())
+    }
+}
+
+/// The writes whose files are shown.
+fn shown(spec: &ParaviewSpec, path: &str, format: Format, resolver: &Resolver) -> Result<Vec<Ref<WritePlan>>, Invalid> {
+    let key = format.key();
+    let has_file = |write: Ref<WritePlan>| resolver.plan[write].files.get(format).is_some();
+    let Some(ids) = &spec.input else {
+        let message = format!("there is no earlier `write` with `{key}` to show; put one first");
+        return Ok(vec![resolver.nearest(has_file).ok_or_else(|| Invalid::new(path, message))?]);
+    };
+    let mut writes = Vec::new();
+    for (name, index) in ids.iter() {
+        let at = format!("{path}.input{index}");
+        let stage = resolver.lookup(&at, name, &[RenderPlan::KIND, WritePlan::KIND])?;
+        let write = match resolver.plan.reference::<RenderPlan>(stage) {
+            Some(render) => {
+                resolver.nearest(|write: Ref<WritePlan>| resolver.plan[write].render == render && has_file(write))
+            }
+            None => resolver.plan.reference(stage).filter(|&write| has_file(write)),
+        };
+        let message = format!("`{name}` has no `{key}` file written before this stage");
+        writes.push(write.ok_or_else(|| Invalid::new(at, message))?);
+    }
+    if writes.is_empty() {
+        return Err(Invalid::new(format!("{path}.input"), "the list is empty; name at least one image"));
+    }
+    Ok(writes)
+}
+
+/// The state's text.
+fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
+    let dark = |write: Ref<WritePlan>| plan[plan[write].render].occlusion.is_some();
+    let mixed = figure.writes.len() == 2 && figure.writes.iter().filter(|&&write| dark(write)).count() == 1;
+    let mut panels = Vec::with_capacity(figure.writes.len());
+    for &write in &figure.writes {
+        let render = &plan[plan[write].render];
+        let grid: Grid = match plan[render.scene].dimension {
+            3 => camera::<3>(&render.camera)?.grid(render.dimensions),
+            _ => camera::<4>(&render.camera)?.grid(render.dimensions),
+        };
+        let file = plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref());
+        let caption = match (figure.writes.len(), render.occlusion) {
+            (1, _) => String::new(),
+            (2, Some(_)) if mixed => "with ambient occlusion".to_owned(),
+            (2, None) if mixed => "without ambient occlusion".to_owned(),
+            _ => plan.id(plan[write].render).replace(['-', '_'], " "),
+        };
+        panels.push(paraview::Panel { file: beside(&figure.state, file), caption, grid });
+    }
+    Ok(paraview::state(&paraview::Figure {
+        title: plan.name.clone(),
+        program: PROGRAM.to_owned(),
+        panels,
+        source: match figure.reader {
+            Reader::Vti => paraview::Source::Vti,
+            Reader::Raw => paraview::Source::Raw,
+        },
+        cut: match figure.cut {
+            Cut::None => paraview::Cut::None,
+            Cut::Octant => paraview::Cut::Octant { corner: None },
+            Cut::Plane(plane) => paraview::Cut::Plane {
+                axis: match plane.plane {
+                    Axis::X => paraview::Axis::X,
+                    Axis::Y => paraview::Axis::Y,
+                    Axis::Z => paraview::Axis::Z,
+                },
+                at: plane.at,
+            },
+        },
+        screenshot: figure.screenshot.as_ref().map(|file| beside(&figure.state, file)),
+        size: figure.size,
+    }))
+}
+
+/// The path of a file in the output folder, as a state in the same folder names it.
+fn beside(state: &Path, file: &Path) -> String {
+    let up = state.parent().map_or(0, |p| p.components().count());
+    let mut path = "../".repeat(up);
+    let names: Vec<String> = file.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+    path.push_str(&names.join("/"));
+    path
+}
+
+/// Whether a regular file holds just these bytes already.
+fn holds(path: &Path, bytes: &[u8]) -> bool {
+    std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == bytes.len() as u64)
+        && std::fs::read(path).is_ok_and(|found| found == bytes)
+}
