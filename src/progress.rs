@@ -34,6 +34,11 @@ impl Progress for Silent {
     fn end(&self) {}
 }
 
+/// The work was cancelled by whoever watches its progress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Cancelled;
+
 impl<'p> dyn Progress + 'p {
     /// Begins a stage that ends when what is returned is dropped, on every way out.
     pub fn stage(&'p self, stage: &str, total: u64) -> Running<'p> {

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::book::Book;
@@ -14,17 +15,17 @@ use super::lock::{Busy, Lock};
 use super::report::Report;
 use super::settings::Backend;
 use super::{Error, Pipeline, Settings};
-use crate::accel::Tracer;
 use crate::io;
 use crate::mesh::Mesh;
 use crate::occlusion::Cancelled;
-use crate::occlusion::opencl::OpenCl;
 use crate::progress::Progress;
+use crate::session::Session;
 use crate::stages::describe::grouped;
 use crate::stages::occlusion::OcclusionPlan;
 use crate::stages::prepare::{Loaded, Prepared};
 use crate::stages::scene::{AnyMesh, ScenePlan};
 use crate::stages::{Keys, Ledger, Ref, Run, SceneRun, StageError};
+use crate::trace::opencl::OpenCl;
 use crate::volume::available_memory;
 
 /// A run that didn't succeed.
@@ -84,7 +85,7 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     let plan = &pipeline.plan;
     let opencl = match &settings.backend {
         Backend::Cpu => None,
-        Backend::OpenCl(places) => Some(OpenCl::open(places)?),
+        Backend::OpenCl(places) => Some(Arc::new(OpenCl::open(places)?)),
     };
     let _lock = Lock::take(&plan.out)?;
     let keys = Keys::new(plan);
@@ -103,12 +104,12 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     let building = began.elapsed();
     let loaded = plan.all::<OcclusionPlan>().zip(loaded).filter_map(|((stage, _), found)| Some((stage, found?)));
     let loaded = loaded.collect();
-    let (opencl, force) = (opencl.as_ref(), settings.force);
+    let force = settings.force;
     let mut run = Schedule { pipeline, opencl, progress, book: &mut book, loaded, force, times: BTreeMap::new() };
     for (((scene, _), mesh), notes) in plan.all::<ScenePlan>().zip(meshes).zip(notes) {
         match mesh {
-            Some(AnyMesh::Three(mesh)) => run.scene(scene, &mesh, notes, building)?,
-            Some(AnyMesh::Four(mesh)) => run.scene(scene, &mesh, notes, building)?,
+            Some(AnyMesh::Three(mesh)) => run.scene(scene, mesh, notes, building)?,
+            Some(AnyMesh::Four(mesh)) => run.scene(scene, mesh, notes, building)?,
             None => (0..plan.stages.len())
                 .filter(|&stage| plan.scene_of(stage) == Some(scene))
                 .for_each(|stage| run.book.tell_unchanged(plan, stage)),
@@ -143,7 +144,7 @@ fn check_resources(pipeline: &Pipeline, book: &Book) -> Result<(), RunError> {
 /// A run in progress.
 struct Schedule<'p> {
     pipeline: &'p Pipeline,
-    opencl: Option<&'p OpenCl>,
+    opencl: Option<Arc<OpenCl>>,
     progress: &'p dyn Progress,
     book: &'p mut Book,
     loaded: BTreeMap<Ref<OcclusionPlan>, Loaded>,
@@ -156,7 +157,7 @@ impl Schedule<'_> {
     fn scene<const D: usize>(
         &mut self,
         scene: Ref<ScenePlan>,
-        mesh: &Mesh<D>,
+        mesh: Mesh<D>,
         mut notes: Vec<String>,
         building: Duration,
     ) -> Result<(), RunError> {
@@ -174,8 +175,11 @@ impl Schedule<'_> {
             ));
         }
         self.book.begin_scene(notes);
-        let tracer = Tracer::new(mesh);
-        let mut at_work = SceneRun::new(&tracer, self.opencl);
+        let session = match &self.opencl {
+            Some(opencl) => Session::on(mesh, Arc::clone(opencl)),
+            None => Session::new(mesh),
+        };
+        let mut at_work = SceneRun { session, values: BTreeMap::new() };
         for stage in (0..plan.stages.len()).filter(|&stage| plan.scene_of(stage) == Some(scene)) {
             if stage != scene.index() {
                 self.stage(stage, |run| plan.run(stage, run, &mut at_work))?;
@@ -203,7 +207,6 @@ impl Schedule<'_> {
         let start = Instant::now();
         let mut run = Run {
             plan: &self.pipeline.plan,
-            opencl: self.opencl,
             progress: self.progress,
             ledger: self.book,
             loaded: std::mem::take(&mut self.loaded),

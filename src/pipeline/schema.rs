@@ -18,7 +18,7 @@ mod tests {
 
     use super::*;
     use crate::pipeline::yaml;
-    use crate::render::Channel;
+    use crate::render::Aov;
     use crate::scene::ObjectSpec;
     use crate::stages::StageSpec;
     use crate::stages::camera::{CameraSpec, Projection};
@@ -75,7 +75,7 @@ mod tests {
             ("Method", decoder_knows::<Method>("zzz")),
             ("Projection", decoder_knows::<Projection>("zzz")),
             ("Shading", decoder_knows::<Shading>("zzz")),
-            ("Channel", decoder_knows::<Channel>("zzz")),
+            ("Aov", decoder_knows::<Aov>("zzz")),
             ("Encoding", decoder_knows::<Encoding>("zzz")),
             ("Compression", decoder_knows::<Compression>("zzz")),
             ("Reader", decoder_knows::<Reader>("zzz")),

@@ -1,8 +1,9 @@
 //! What can be wrong with a stage, and what can go wrong when it runs.
 
 use crate::io;
-use crate::occlusion::{self, Cancelled, opencl};
+use crate::occlusion::{self, Cancelled};
 use crate::render::CameraError;
+use crate::trace::{self, opencl};
 
 /// A complaint about the value at a path, raised by a check that knows no lines; whoever holds the text finds the line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -48,5 +49,11 @@ impl From<occlusion::Error> for StageError {
             occlusion::Error::OpenCl(error) => Self::OpenCl(error),
             error => Self::Occlusion(error),
         }
+    }
+}
+
+impl From<trace::Error> for StageError {
+    fn from(error: trace::Error) -> Self {
+        occlusion::Error::from(error).into()
     }
 }

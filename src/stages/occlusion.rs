@@ -5,6 +5,7 @@
 //! their standard errors, where the method has any.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use schemars::JsonSchema;
@@ -21,7 +22,8 @@ use super::write::{self, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::io;
 use crate::occlusion::exact::{self, Budget};
-use crate::occlusion::{self, Estimates, Sampler, Settings, Sidecar, Slips, Target};
+use crate::occlusion::{self, Deviations, Estimates, Estimator, Sidecar};
+use crate::trace::{Sampler, Sampling, Target};
 
 /// The most samples a vertex.
 pub const MAX_SAMPLES: u64 = 1 << 24;
@@ -249,10 +251,10 @@ impl Stage for OcclusionPlan {
         }
         let start = Instant::now();
         values(me, run, scene)?;
-        let found = &scene.values[&me];
-        let detail = rate(found, start);
+        let found = Arc::clone(&scene.values[&me]);
+        let detail = rate(&found, start);
         let sidecar = match (&plan[me].source, run.loaded.get(&me)) {
-            (OcclusionSource::Compute(computation), _) => sidecar(found, computation, &scene.hash),
+            (OcclusionSource::Compute(computation), _) => sidecar(&found, computation, scene.session.mesh_hash()),
             (OcclusionSource::Load(_), Some(loaded)) => loaded.sidecar.clone(),
             (OcclusionSource::Load(_), None) => return Ok(String::new()),
         };
@@ -330,7 +332,9 @@ pub fn values<const D: usize>(
         OcclusionSource::Compute(computation) => {
             // A file that is still fresh holds the values already.
             let file = plan[me].file.as_deref().filter(|file| !run.is_stale(file));
-            match file.and_then(|file| kept(&plan.out.join(file), &scene.hash, scene.mesh.vertices.len())) {
+            match file.and_then(|file| {
+                kept(&plan.out.join(file), scene.session.mesh_hash(), scene.session.mesh().vertices.len())
+            }) {
                 Some(found) => found,
                 None => {
                     let start = Instant::now();
@@ -342,7 +346,7 @@ pub fn values<const D: usize>(
             }
         }
     };
-    scene.values.insert(me, values);
+    scene.values.insert(me, Arc::new(values));
     Ok(())
 }
 
@@ -352,20 +356,16 @@ fn compute<const D: usize>(
     run: &Run,
     scene: &SceneRun<D>,
 ) -> Result<Estimates, StageError> {
-    let wanted = wanted(me, computation, run, scene)?;
-    let count = scene.mesh.vertices.len();
-    let asked = wanted.as_ref().map_or(count, |w| w.iter().filter(|&&w| w).count());
+    let mask = mask(me, computation, run, scene)?;
+    let count = scene.session.mesh().vertices.len();
+    let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
     let _running = run.progress.stage(&format!("occlusion {}", run.plan.id(me)), asked as u64);
-    let (method, wanted) = (computation.method(), wanted.as_deref());
-    Ok(match scene.device()? {
-        Some(device) => method.at_wanted_on(device, wanted, run.progress)?,
-        None => method.at_wanted(scene.tracer, wanted, run.progress)?,
-    })
+    Ok(scene.session.occlusion(computation.estimator(), mask.as_deref(), run.progress)?)
 }
 
 /// The vertices of the simplices that some voxel shows, of the pictures that have to be made; none if all values are
 /// wanted for some file, or if looking costs more than it may save.
-fn wanted<const D: usize>(
+fn mask<const D: usize>(
     me: Ref<OcclusionPlan>,
     computation: &Computation,
     run: &Run,
@@ -378,18 +378,18 @@ fn wanted<const D: usize>(
     if shown || plan[me].file.is_some() {
         return Ok(None);
     }
-    let mut left = computation.most_rays().saturating_mul(scene.mesh.vertices.len() as u64) / 4;
-    let mut wanted = vec![false; scene.mesh.vertices.len()];
+    let mut left = computation.most_rays().saturating_mul(scene.session.mesh().vertices.len() as u64) / 4;
+    let mut mask = vec![false; scene.session.mesh().vertices.len()];
     for (stage, render) in plan.all::<RenderPlan>() {
         let values = render.occlusion == Some(me) && render.shading != render::Shading::Voxel;
         if values && render::is_stale(stage, plan, &|file| run.is_stale(file)) {
-            let seen = render::mark_seen(stage, run, scene, &mut left, &mut wanted)?;
+            let seen = render::mark_seen(stage, run, scene, &mut left, &mut mask)?;
             if !seen {
                 return Ok(None);
             }
         }
     }
-    Ok(Some(wanted))
+    Ok(Some(mask))
 }
 
 /// How fast values were found since then.
@@ -489,23 +489,24 @@ impl Method {
 }
 
 impl Computation {
-    /// The method that a computation stands for.
-    pub fn method(&self) -> occlusion::Method {
+    /// What computes the values.
+    pub fn estimator(&self) -> Estimator {
         let (samples, target) = match self.samples {
             Samples::Fixed(n) => (n, None),
             Samples::Target { error, max_samples } => (max_samples, Some(Target { error: error as f32 })),
-            Samples::Exact => return occlusion::Method::Exact(Budget { cones: self.max_cones as usize }),
+            Samples::Exact => return Estimator::Exact(Budget { cones: self.max_cones as usize }),
         };
-        let settings = Settings {
+        let sampling = Sampling {
             sampler: if self.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
             samples: u32::try_from(samples).unwrap_or(u32::MAX),
             seed: self.seed,
             max_distance: self.max_distance.map_or(f32::INFINITY, |d| d as f32),
+            target,
         };
         match self.method {
-            Method::Adaptive => occlusion::Method::Adaptive(settings, target),
-            Method::AsPublished => occlusion::Method::AsPublished(settings, Slips::PUBLISHED),
-            _ => occlusion::Method::Sampled(settings, target),
+            Method::Adaptive => Estimator::Adaptive(sampling),
+            Method::AsPublished => Estimator::AsPublished(sampling, Deviations::PUBLISHED),
+            _ => Estimator::Sampled(sampling),
         }
     }
 

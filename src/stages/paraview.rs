@@ -16,7 +16,7 @@ use super::scene::ScenePlan;
 use super::write::{Format, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError};
 use crate::io::paraview;
-use crate::render::Channel;
+use crate::render::Aov;
 use crate::volume::Grid;
 
 /// A ParaView state (a Python file) that shows images side by side.
@@ -94,7 +94,7 @@ impl Stage for FigurePlan {
         if reader == Reader::Vti {
             for &write in &writes {
                 let arrays = &resolver.plan[write].arrays;
-                if !arrays.contains(&Channel::Rgba) || !arrays.contains(&Channel::Opacity) {
+                if !arrays.contains(&Aov::Rgba) || !arrays.contains(&Aov::Opacity) {
                     let id = resolver.plan.id(write);
                     let message = format!("shows `{id}`, whose arrays lack rgba or opacity; add them to its `arrays`");
                     return Err(Invalid::new(path, message));

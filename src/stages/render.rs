@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use schemars::JsonSchema;
@@ -17,7 +18,7 @@ use super::scene::{MISSING, ScenePlan};
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Channel, Fragment, NOTHING, Picture};
+use crate::render::{self, Aov, Columns, NOTHING, Renderer};
 
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
@@ -73,7 +74,7 @@ pub struct RenderPlan {
     /// How it is found out what voxels see.
     pub visibility: Visibility,
     /// The arrays that its files need, in their own order, each once.
-    pub arrays: Vec<Channel>,
+    pub arrays: Vec<Aov>,
 }
 
 impl RenderPlan {
@@ -142,17 +143,17 @@ impl Stage for RenderPlan {
     /// The memory of a slab of one layer: what is seen, its shade, and the arrays of the files that have to be made.
     fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
         let render = &plan[me];
-        let mut channels: BTreeSet<Channel> = BTreeSet::new();
+        let mut aovs: BTreeSet<Aov> = BTreeSet::new();
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == me) {
-            channels.extend(write.stale(Content::Voxels, stale).into_iter().flat_map(|file| file.format.arrays(write)));
+            aovs.extend(write.stale(Content::Voxels, stale).into_iter().flat_map(|file| file.format.arrays(write)));
         }
-        if channels.is_empty() {
+        if aovs.is_empty() {
             return Needs::default();
         }
-        channels.insert(Channel::Opacity); // counts what is seen
         let dimension = plan[render.scene].dimension;
-        let arrays: u64 = channels.iter().map(|&channel| array_bytes(channel, dimension)).sum();
-        let voxel = size_of::<u32>() as u64 + size_of::<Fragment>() as u64 + arrays;
+        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
+        let columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
+        let voxel = size_of::<u32>() as u64 + columns.bytes::<4>() as u64 + arrays;
         Needs { memory: (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel), disk: 0 }
     }
 
@@ -186,32 +187,23 @@ impl Stage for RenderPlan {
         if let Some(occlusion) = render.occlusion.filter(|_| render.shading != Shading::Voxel) {
             occlusion::values(occlusion, run, scene)?;
         }
-        let camera = scene.camera(&render.camera)?;
-        let grid = camera.grid(render.dimensions);
-        let picture = Picture {
-            tracer: scene.tracer,
-            grid,
-            camera,
-            shading: shading(plan, render, scene),
-            device: scene.device()?,
-        };
+        let shading = shading(plan, render, scene);
+        let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
+        picture.visibility = render.visibility;
         let start = Instant::now();
-        let visibility = picture.visibility(render.visibility);
-        let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &grid, &scene.hash)?;
-        let channels = files.channels().to_vec();
-        let thick = picture.layers_within(SLAB_BYTES, &channels);
-        let depth = grid.dimensions[2];
+        let hash = scene.session.mesh_hash();
+        let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &picture.grid, hash)?;
+        let aovs = files.aovs().to_vec();
         let mut seen = 0;
         // Two passes over the voxels: what is seen, and its shade.
         let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
-        for first in (0..depth).step_by(thick) {
-            let layers = first..depth.min(first + thick);
-            let slab = picture.slab_of(&visibility, layers, &channels, run.progress)?;
-            seen += files.add_slab(first, &slab)?;
-        }
+        picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
+            seen += slab.seen;
+            Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
+        })?;
         running.end();
         let rendering = start.elapsed();
-        let nothing = seen == 0 && !scene.mesh.simplices.is_empty();
+        let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
         let notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
         for (file, bytes) in files.finish()? {
             run.made(&file, bytes, notes.clone())?;
@@ -232,8 +224,8 @@ pub(super) fn is_stale(me: Ref<RenderPlan>, plan: &Plan, stale: &dyn Fn(&Path) -
 }
 
 /// Bytes that a voxel takes in this array.
-pub(super) fn array_bytes(channel: Channel, dimension: usize) -> u64 {
-    let bytes = if dimension == 3 { channel.bytes::<3>() } else { channel.bytes::<4>() };
+pub(super) fn array_bytes(aov: Aov, dimension: usize) -> u64 {
+    let bytes = if dimension == 3 { aov.bytes::<3>() } else { aov.bytes::<4>() };
     bytes as u64
 }
 
@@ -244,24 +236,25 @@ pub(super) fn mark_seen<const D: usize>(
     run: &Run,
     scene: &SceneRun<D>,
     left: &mut u64,
-    wanted: &mut [bool],
+    mask: &mut [bool],
 ) -> Result<bool, StageError> {
     let render = &run.plan[me];
-    let camera = scene.camera(&render.camera)?;
+    let camera = camera::camera(&render.camera)?;
     let grid = camera.grid(render.dimensions);
-    let visibility = render::Visibility::new(scene.tracer, &camera, &grid, render.visibility).on(scene.device()?);
+    let backend = Arc::clone(scene.session.backend()?);
+    let visibility = render::Visibility::new(backend, &camera, &grid, render.visibility);
     *left = left.saturating_sub(visibility.cost());
     if *left == 0 {
         return Ok(false);
     }
     let _running = run.progress.stage(&format!("what {} shows", run.plan.id(me)), render.voxels());
-    let thick = (SLAB_BYTES / 4 / grid.layer_len()).clamp(1, grid.dimensions[2]);
+    let thick = (SLAB_BYTES / size_of::<u32>() / grid.layer_len()).clamp(1, grid.dimensions[2]);
     for first in (0..grid.dimensions[2]).step_by(thick) {
         let layers = first..grid.dimensions[2].min(first + thick);
         let mut last = NOTHING;
         for simplex in visibility.first_hits(layers, run.progress)? {
             if simplex != NOTHING && simplex != last {
-                scene.mesh.simplices[simplex as usize].iter().for_each(|&v| wanted[v as usize] = true);
+                scene.session.mesh().simplices[simplex as usize].iter().for_each(|&v| mask[v as usize] = true);
                 last = simplex;
             }
         }
@@ -269,19 +262,19 @@ pub(super) fn mark_seen<const D: usize>(
     Ok(true)
 }
 
-fn shading<'v, const D: usize>(plan: &Plan, render: &RenderPlan, scene: &'v SceneRun<D>) -> render::Shading<'v> {
+fn shading<const D: usize>(plan: &Plan, render: &RenderPlan, scene: &SceneRun<D>) -> render::Shading {
     let Some(occlusion) = render.occlusion else { return render::Shading::None };
     match (render.shading, &plan[occlusion].source) {
-        (Shading::Voxel, OcclusionSource::Compute(computation)) => render::Shading::Voxel(computation.method()),
-        (Shading::Flat, _) => render::Shading::Flat(&scene.values[&occlusion].values),
-        _ => render::Shading::Smooth(&scene.values[&occlusion].values),
+        (Shading::Voxel, OcclusionSource::Compute(computation)) => render::Shading::Voxel(computation.estimator()),
+        (Shading::Flat, _) => render::Shading::Flat(Arc::clone(&scene.values[&occlusion])),
+        _ => render::Shading::Smooth(Arc::clone(&scene.values[&occlusion])),
     }
 }
 
 /// Why a picture shows nothing.
-fn nothing_seen<const D: usize>(picture: &Picture<D>, id: &str) -> String {
-    let behind = |v: &u32| picture.camera.project(&picture.tracer.mesh().vertices[*v as usize]).1 <= 0.0;
-    let why = if picture.tracer.mesh().simplices.iter().flatten().all(behind) {
+fn nothing_seen<const D: usize>(picture: &Renderer<D>, id: &str) -> String {
+    let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
+    let why = if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
         "the scene lies wholly behind the camera; turn the camera, or move it back"
     } else {
         "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"

@@ -1,20 +1,17 @@
 //! What a stage has at hand when it runs: the scene, what earlier stages found, and the book of files.
 
-use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::occlusion::OcclusionPlan;
 use super::prepare::Loaded;
-use super::{Plan, Ref, StageError, camera};
-use crate::accel::Tracer;
+use super::{Plan, Ref, StageError};
 use crate::io;
-use crate::mesh::Mesh;
 use crate::occlusion::Estimates;
-use crate::occlusion::opencl::{self, OpenCl};
 use crate::progress::Progress;
-use crate::render::Camera;
+use crate::session::Session;
 
 /// Who knows which files have to be made, and remembers those that were.
 pub trait Ledger {
@@ -53,8 +50,6 @@ pub struct Made<'a> {
 pub struct Run<'p> {
     /// What is to be done.
     pub plan: &'p Plan,
-    /// The devices that trace rays, if not the processor.
-    pub opencl: Option<&'p OpenCl>,
     /// Who watches.
     pub progress: &'p dyn Progress,
     /// The book of files.
@@ -91,43 +86,10 @@ impl Run<'_> {
 }
 
 /// What has been made of a scene so far.
-pub struct SceneRun<'m, const D: usize> {
-    /// The scene.
-    pub mesh: &'m Mesh<D>,
-    /// The hash of its content.
-    pub hash: String,
-    /// What traces rays in it.
-    pub tracer: &'m Tracer<'m, D>,
+#[derive(Debug)]
+pub struct SceneRun<const D: usize> {
+    /// The scene, and what traces rays in it.
+    pub session: Session<D>,
     /// The values that are known.
-    pub values: BTreeMap<Ref<OcclusionPlan>, Estimates>,
-    opencl: Option<&'m OpenCl>,
-    device: OnceCell<opencl::Scene<'m, D>>,
-}
-
-impl<'m, const D: usize> SceneRun<'m, D> {
-    /// A scene of which nothing is made yet.
-    pub fn new(tracer: &'m Tracer<'m, D>, opencl: Option<&'m OpenCl>) -> Self {
-        let mesh = tracer.mesh();
-        Self { mesh, hash: mesh.content_hash(), tracer, values: BTreeMap::new(), opencl, device: OnceCell::new() }
-    }
-
-    /// What is on the OpenCL device, if there is one; brought there when first asked for.
-    ///
-    /// # Errors
-    /// If it doesn't fit there.
-    pub fn device(&self) -> Result<Option<&opencl::Scene<'m, D>>, StageError> {
-        let Some(opencl) = self.opencl else { return Ok(None) };
-        if self.device.get().is_none() {
-            let _ = self.device.set(opencl::Scene::new(opencl, self.tracer)?);
-        }
-        Ok(self.device.get())
-    }
-
-    /// The camera of a plan.
-    ///
-    /// # Errors
-    /// If rounding leaves it without a frame.
-    pub fn camera(&self, plan: &camera::CameraPlan) -> Result<Camera<D>, StageError> {
-        Ok(camera::camera(plan)?)
-    }
+    pub values: BTreeMap<Ref<OcclusionPlan>, Arc<Estimates>>,
 }

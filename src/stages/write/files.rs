@@ -4,21 +4,21 @@ use std::path::{Path, PathBuf};
 
 use super::{Content, Opening, VoxelFile, WritePlan};
 use crate::io::Error;
-use crate::render::Channel;
+use crate::render::Aov;
 use crate::stages::render::RenderPlan;
 use crate::stages::{Plan, Ref};
-use crate::volume::{Array, Grid, Values};
+use crate::volume::{Array, Grid};
 
 /// The open files of one picture.
 pub(in crate::stages) struct PictureFiles {
-    channels: Vec<Channel>,
+    aovs: Vec<Aov>,
     files: Vec<Open>,
 }
 
 struct Open {
     path: PathBuf,
     file: Box<dyn VoxelFile>,
-    /// Where among the channels its arrays are.
+    /// Where among the aovs its arrays are.
     places: Vec<usize>,
 }
 
@@ -31,12 +31,11 @@ impl PictureFiles {
         grid: &Grid,
         mesh_hash: &str,
     ) -> Result<Self, Error> {
-        // What is seen is counted by opacity, so that is always made.
-        let mut channels = vec![Channel::Opacity];
-        let mut place = |channel: Channel| {
-            channels.iter().position(|&c| c == channel).unwrap_or_else(|| {
-                channels.push(channel);
-                channels.len() - 1
+        let mut aovs: Vec<Aov> = Vec::new();
+        let mut place = |aov: Aov| {
+            aovs.iter().position(|&c| c == aov).unwrap_or_else(|| {
+                aovs.push(aov);
+                aovs.len() - 1
             })
         };
         let mut files = Vec::new();
@@ -48,24 +47,21 @@ impl PictureFiles {
                 files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
             }
         }
-        Ok(Self { channels, files })
+        Ok(Self { aovs, files })
     }
 
     /// What the files need of each slab, in this order.
-    pub fn channels(&self) -> &[Channel] {
-        &self.channels
+    pub fn aovs(&self) -> &[Aov] {
+        &self.aovs
     }
 
-    /// Writes some layers to all files; returns how many of their voxels see something.
-    pub fn add_slab(&mut self, first: usize, slab: &[Array]) -> Result<u64, Error> {
+    /// Writes some layers, of which `first` is the first, to all files.
+    pub fn add_slab(&mut self, first: usize, slab: &[Array]) -> Result<(), Error> {
         for Open { file, places, .. } in &mut self.files {
             let arrays: Vec<&Array> = places.iter().map(|&place| &slab[place]).collect();
             file.add_slab(first, &arrays)?;
         }
-        Ok(match slab.first().map(|opacity| &opacity.values) {
-            Some(Values::F32(opacity)) => opacity.iter().filter(|&&o| o > 0.0).count() as u64,
-            _ => 0,
-        })
+        Ok(())
     }
 
     /// Completes the files and gives them their names; returns each with its length.

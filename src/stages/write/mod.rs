@@ -18,6 +18,7 @@ use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::camera::camera;
 use super::describe::{Counts, Totals, size};
 use super::occlusion;
 use super::render::RenderPlan;
@@ -26,7 +27,7 @@ use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, Sce
 use crate::io::{AtomicFile, Error};
 use crate::mesh::Mesh;
 use crate::occlusion::Estimates;
-use crate::render::{Camera, Channel};
+use crate::render::{Aov, Camera};
 use crate::volume::{Array, Grid};
 
 pub(super) use files::PictureFiles;
@@ -53,7 +54,7 @@ trait OutputFormat {
     const TELLS_PIPELINE: bool = false;
 
     /// The arrays that it needs of a picture.
-    fn arrays(_write: &WritePlan) -> Vec<Channel> {
+    fn arrays(_write: &WritePlan) -> Vec<Aov> {
         Vec::new()
     }
 
@@ -114,7 +115,7 @@ macro_rules! formats {
             pub input: Option<String>,
             $($(#[$doc])+ pub $key: Option<String>,)+
             /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`).
-            pub arrays: Option<Vec<Channel>>,
+            pub arrays: Option<Vec<Aov>>,
             /// How the `.vti` stores numbers (default `appended`).
             pub encoding: Option<Encoding>,
             /// How the `.vti` packs them (default `none`).
@@ -142,7 +143,7 @@ macro_rules! formats {
             }
 
             /// The arrays that it needs of a picture.
-            pub fn arrays(self, write: &WritePlan) -> Vec<Channel> {
+            pub fn arrays(self, write: &WritePlan) -> Vec<Aov> {
                 match self { $(Self::$name => <$key::$name>::arrays(write)),+ }
             }
 
@@ -228,7 +229,7 @@ pub struct WritePlan {
     /// The files, each format at most once.
     pub files: Files,
     /// What the image data holds, in this order.
-    pub arrays: Vec<Channel>,
+    pub arrays: Vec<Aov>,
     /// How it stores numbers.
     pub encoding: Encoding,
     /// How it packs them.
@@ -312,7 +313,7 @@ impl Stage for WritePlan {
             return Err(Invalid::new(path, format!("names no file; give at least one of {}", keys.join(", "))));
         }
         let arrays = match &spec.arrays {
-            None => vec![Channel::Rgba, Channel::AmbientOcclusion, Channel::Opacity],
+            None => vec![Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity],
             Some(arrays) => arrays.clone(),
         };
         if arrays.is_empty() {
@@ -419,13 +420,13 @@ impl Stage for WritePlan {
             if let Some(occlusion) = render.occlusion {
                 occlusion::values(occlusion, run, scene)?;
             }
-            let camera = scene.camera(&render.camera)?;
-            let values = render.occlusion.map(|occlusion| &scene.values[&occlusion]);
-            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), scene.mesh, &camera, values)?;
+            let (mesh, camera) = (scene.session.mesh(), camera(&render.camera)?);
+            let values = render.occlusion.map(|occlusion| &*scene.values[&occlusion]);
+            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), mesh, &camera, values)?;
             let note = format!(
                 "{}: {left_out} of {} simplices are not wholly before the eye and are left out",
                 path.display(),
-                scene.mesh.simplices.len()
+                mesh.simplices.len()
             );
             run.made(path, bytes, (left_out > 0).then_some(note).into_iter().collect())?;
         }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{Content, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
 use crate::io::png::{self, Slices};
 use crate::io::{AtomicFile, Error};
-use crate::render::Channel;
+use crate::render::Aov;
 use crate::volume::{Array, Values};
 
 pub(super) struct Png;
@@ -18,8 +18,8 @@ impl OutputFormat for Png {
         LeftOut::new("/compression", "about `.vti` only"),
     ];
 
-    fn arrays(_: &WritePlan) -> Vec<Channel> {
-        vec![Channel::Rgba]
+    fn arrays(_: &WritePlan) -> Vec<Aov> {
+        vec![Aov::Rgba]
     }
 
     fn open(Opening { path, grid, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {

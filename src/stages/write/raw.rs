@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{Content, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
 use crate::io::raw::RawWriter;
 use crate::io::{AtomicFile, Error};
-use crate::render::Channel;
+use crate::render::Aov;
 use crate::stages::render::array_bytes;
 use crate::volume::{Array, Values};
 
@@ -19,12 +19,12 @@ impl OutputFormat for Raw {
         LeftOut::new("/compression", "about `.vti` only"),
     ];
 
-    fn arrays(_: &WritePlan) -> Vec<Channel> {
-        vec![Channel::Rgb]
+    fn arrays(_: &WritePlan) -> Vec<Aov> {
+        vec![Aov::Rgb]
     }
 
     fn voxel_bytes(_: &WritePlan, dimension: usize) -> u64 {
-        array_bytes(Channel::Rgb, dimension)
+        array_bytes(Aov::Rgb, dimension)
     }
 
     fn open(Opening { path, grid, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {

@@ -7,11 +7,11 @@ use serde_json::json;
 use super::{Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, VoxelFile, WritePlan};
 use crate::io::vti::{self, ArraySpec, VtiWriter};
 use crate::io::{AtomicFile, Error};
-use crate::render::Channel;
+use crate::render::Aov;
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
 use crate::stages::render::array_bytes;
-use crate::volume::{Array, Kind};
+use crate::volume::Array;
 
 pub(super) struct Vti;
 
@@ -20,7 +20,7 @@ impl OutputFormat for Vti {
     const LEFT_OUT: &'static [LeftOut] = &[];
     const TELLS_PIPELINE: bool = true;
 
-    fn arrays(write: &WritePlan) -> Vec<Channel> {
+    fn arrays(write: &WritePlan) -> Vec<Aov> {
         write.arrays.clone()
     }
 
@@ -68,14 +68,9 @@ impl VoxelFile for File {
     }
 }
 
-fn array_spec(channel: Channel, dimension: usize) -> ArraySpec {
-    let kind = match channel {
-        Channel::Rgba => Kind::U8,
-        Channel::Object => Kind::U16,
-        _ => Kind::F32,
-    };
-    let components = if dimension == 3 { channel.components::<3>() } else { channel.components::<4>() };
-    ArraySpec::new(channel.name(), kind, components)
+fn array_spec(aov: Aov, dimension: usize) -> ArraySpec {
+    let components = if dimension == 3 { aov.components::<3>() } else { aov.components::<4>() };
+    ArraySpec::new(aov.name(), aov.kind(), components)
 }
 
 /// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
