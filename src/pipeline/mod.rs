@@ -14,6 +14,7 @@ mod book;
 mod cache;
 mod document;
 mod error;
+mod guard;
 mod lock;
 pub mod overrides;
 mod pool;
@@ -72,49 +73,12 @@ impl Pipeline {
     /// # Errors
     /// Whatever is wrong with an object or a file, with the line that asked for it.
     pub fn prepare(&self, wanted: impl Fn(usize) -> bool) -> Result<Prepared, Error> {
-        self.guard_inputs()?;
+        guard::check(self)?;
         self.plan.prepare(wanted).map_err(|invalid| self.document.refuse(invalid))
-    }
-
-    /// Refuses a pipeline one of whose files would take the place of one that it reads.
-    fn guard_inputs(&self) -> Result<(), Error> {
-        let plan = &self.plan;
-        let mut inputs = vec![(PathBuf::from(self.document.file()), "the pipeline itself".to_owned())];
-        for (index, stage) in plan.stages.iter().enumerate() {
-            inputs
-                .extend(plan.input_files(index).into_iter().map(|file| (file, format!("an input of {}", stage.path))));
-        }
-        let inputs: Vec<_> =
-            inputs.iter().flat_map(|(file, what)| places(file).map(move |place| (place, what))).collect();
-        for (index, stage) in plan.stages.iter().enumerate() {
-            for file in plan.all_files_of(index) {
-                let Some(place) = place(&plan.out.join(&file)) else { continue };
-                if let Some((_, what)) = inputs.iter().find(|(input, _)| *input == place) {
-                    let message = format!(
-                        "\"{}\" in {} would replace {what}; give it another name, or write elsewhere with --out",
-                        file.display(),
-                        plan.out.display()
-                    );
-                    return Err(self.document.refuse(Invalid::new(&stage.path, message)));
-                }
-            }
-        }
-        Ok(())
     }
 
     /// What is allowed but probably not meant, each with its place.
     pub fn warnings(&self) -> impl Iterator<Item = Error> {
         self.plan.warnings.iter().map(|warning| self.document.refuse(warning.clone()))
     }
-}
-
-/// Where a name is in the end: its folder without links, and itself. None if there is no such folder.
-fn place(path: &Path) -> Option<PathBuf> {
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    Some(folder.canonicalize().ok()?.join(path.file_name()?))
-}
-
-/// The names that lead to an input: its own, and that of the file behind it if it is a link.
-fn places(path: &Path) -> impl Iterator<Item = PathBuf> {
-    place(path).into_iter().chain(path.canonicalize().ok())
 }
