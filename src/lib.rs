@@ -19,6 +19,7 @@
 
 pub mod accel;
 pub mod geometry;
+pub mod input;
 pub mod inspect;
 pub mod io;
 pub mod mesh;
@@ -29,5 +30,6 @@ pub mod render;
 pub mod scene;
 pub mod session;
 pub mod stages;
+pub mod text;
 pub mod trace;
 pub mod volume;

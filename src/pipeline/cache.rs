@@ -39,9 +39,7 @@ pub struct Cache {
 impl Cache {
     /// Reads what is known; nothing if there is nothing, or nothing readable. With `force` nothing counts as fresh.
     pub fn open(folder: &Path, force: bool) -> Self {
-        let path = folder.join(NAME);
-        // Reading anything but a file could go on for ever.
-        let text = if path.is_file() { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
+        let text = crate::input::read_text(&folder.join(NAME)).unwrap_or_default();
         Self { folder: folder.to_owned(), entries: serde_json::from_str(&text).unwrap_or_default(), force }
     }
 

@@ -9,7 +9,7 @@
 //! nothing ever had or will have: what is made of it is never taken for fresh.
 
 use std::collections::BTreeMap;
-use std::fs::{File, Metadata};
+use std::fs::Metadata;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -120,11 +120,7 @@ impl Inputs {
 
 /// The content of a regular file, hashed; none if it can't be read whole, or changes meanwhile.
 fn hash_file(path: &Path) -> Option<Hashed> {
-    // Asked before it is opened: opening a FIFO waits for whoever writes into it.
-    if !std::fs::metadata(path).ok()?.is_file() {
-        return None;
-    }
-    let mut file = File::open(path).ok()?;
+    let mut file = crate::input::open(path).ok()?;
     let stamp = Stamp::new(&file.metadata().ok()?);
     let (mut hasher, mut chunk, mut bytes) = (Sha256::new(), vec![0; CHUNK], 0);
     loop {

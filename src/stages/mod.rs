@@ -51,6 +51,8 @@ pub use run::{Ledger, Made, Run, SceneRun};
 
 /// Coordinates and lengths beyond this are refused: their squares must stay far inside `f32`.
 pub const MAX_LENGTH: f64 = 1e12;
+/// No length that must be above zero may be below this.
+pub const MIN_LENGTH: f64 = 1e-12;
 
 /// What every kind of stage says of itself.
 pub trait Stage: plan::OfKind + Serialize {

@@ -23,6 +23,7 @@ use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, 
 use crate::io;
 use crate::occlusion::exact::{self, Budget};
 use crate::occlusion::{self, Deviations, Estimates, Estimator, Sidecar};
+use crate::text::number;
 use crate::trace::{Sampler, Sampling, Target};
 
 /// The most samples a vertex.
@@ -155,8 +156,12 @@ impl Stage for OcclusionPlan {
             Some(name) => {
                 let key = format!("{path}.load");
                 let file = resolver.plan.folder.join(name);
-                if name.is_empty() || !file.is_file() {
-                    return Err(Invalid::new(key, format!("there is no file {}", file.display())));
+                match crate::input::length(&file) {
+                    Ok(_) if !name.is_empty() => {}
+                    Err(cause) if file.exists() => {
+                        return Err(Invalid::new(key, format!("can't read {}: {cause}", file.display())));
+                    }
+                    _ => return Err(Invalid::new(key, format!("there is no file {}", file.display()))),
                 }
                 let unused: Vec<&str> = written(spec).collect();
                 if !unused.is_empty() {
@@ -435,6 +440,7 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
         (None, None) => Samples::Fixed(256),
         (None, Some(error)) => {
             if !(error > 0.0 && error < 1.0) {
+                let error = number(error);
                 return refuse("target_error", format!("expected an error above 0 and below 1, found {error}"));
             }
             Samples::Target { error, max_samples: count("max_samples", spec.max_samples.unwrap_or(65_536))? }

@@ -15,6 +15,7 @@ use super::render::RenderPlan;
 use super::scene::ScenePlan;
 use super::write::{Format, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError};
+use crate::geometry::Dimension;
 use crate::io::paraview;
 use crate::render::Aov;
 use crate::volume::Grid;
@@ -197,8 +198,8 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
     for &write in &figure.writes {
         let render = &plan[plan[write].render];
         let grid: Grid = match plan[render.scene].dimension {
-            3 => camera::<3>(&render.camera)?.grid(render.dimensions),
-            _ => camera::<4>(&render.camera)?.grid(render.dimensions),
+            Dimension::Three => camera::<3>(&render.camera)?.grid(render.dimensions),
+            Dimension::Four => camera::<4>(&render.camera)?.grid(render.dimensions),
         };
         let file = plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref());
         let caption = match (figure.writes.len(), render.occlusion) {
@@ -245,6 +246,6 @@ fn beside(state: &Path, file: &Path) -> String {
 
 /// Whether a regular file holds just these bytes already.
 fn holds(path: &Path, bytes: &[u8]) -> bool {
-    std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == bytes.len() as u64)
-        && std::fs::read(path).is_ok_and(|found| found == bytes)
+    crate::input::length(path).is_ok_and(|length| length == bytes.len() as u64)
+        && crate::input::read(path).is_ok_and(|found| found == bytes)
 }

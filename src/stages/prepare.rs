@@ -94,9 +94,8 @@ pub(super) fn errors_path(file: &Path) -> PathBuf {
 fn read_values(file: &Path, hash: &str, vertices: usize) -> Result<Loaded, String> {
     let side = sidecar_path(file);
     let unreadable = |path: &Path, cause: std::io::Error| format!("can't read {}: {cause}", path.display());
-    let text = read_regular(&side).map_err(|e| unreadable(&side, e))?;
-    let text = String::from_utf8_lossy(&text);
-    let bytes = read_regular(file).map_err(|e| unreadable(file, e))?;
+    let text = crate::input::read_text(&side).map_err(|e| unreadable(&side, e))?;
+    let bytes = crate::input::read(file).map_err(|e| unreadable(file, e))?;
     let unusable = |path: &Path, cause: String| format!("can't use {}: {cause}", path.display());
     let sidecar = Sidecar::from_yaml(&text).and_then(|s| s.check(hash, vertices).map(|()| s));
     let sidecar = sidecar.map_err(|e| unusable(file, e.to_string()))?;
@@ -106,7 +105,7 @@ fn read_values(file: &Path, hash: &str, vertices: usize) -> Result<Loaded, Strin
     if sidecar.method == Method::Exact.as_str() {
         return Ok(Loaded { values, errors: vec![0.0; vertices], sidecar });
     }
-    let errors = match read_regular(&beside) {
+    let errors = match crate::input::read(&beside) {
         Ok(bytes) => occlusion::decode(&bytes, vertices).map_err(|e| unusable(&beside, e.to_string()))?,
         Err(_) => Vec::new(),
     };
@@ -124,12 +123,4 @@ fn read_values(file: &Path, hash: &str, vertices: usize) -> Result<Loaded, Strin
     }
     let Estimates { values, errors, .. } = found;
     Ok(Loaded { values, errors, sidecar })
-}
-
-/// The bytes of a regular file. Whatever else has a name, such as a FIFO, may never end.
-fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    if std::fs::metadata(path)?.is_file() {
-        return std::fs::read(path);
-    }
-    Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is not a regular file"))
 }

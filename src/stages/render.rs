@@ -17,6 +17,7 @@ use super::occlusion::{self, Method, OcclusionPlan, OcclusionSource};
 use super::scene::{MISSING, ScenePlan};
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use crate::geometry::Dimension;
 use crate::render::visibility::Method as Visibility;
 use crate::render::{self, Aov, Columns, NOTHING, Renderer};
 
@@ -168,7 +169,10 @@ impl Stage for RenderPlan {
             ProjectionPlan::Perspective { field_of_view } => format!("perspective {field_of_view} degrees"),
             ProjectionPlan::Parallel { height } => format!("parallel, height {height}"),
         };
-        let extent = if plan[render.scene].dimension == 3 { format!("{x} x {y}") } else { format!("{x} x {y} x {z}") };
+        let extent = match plan[render.scene].dimension {
+            Dimension::Three => format!("{x} x {y}"),
+            Dimension::Four => format!("{x} x {y} x {z}"),
+        };
         let (scene, voxels) = (plan.id(render.scene), grouped(render.voxels()));
         format!("{scene} {with}: {extent} = {voxels} voxels, {}, {projection}", render.shading.as_str())
     }
@@ -224,8 +228,11 @@ pub(super) fn is_stale(me: Ref<RenderPlan>, plan: &Plan, stale: &dyn Fn(&Path) -
 }
 
 /// Bytes that a voxel takes in this array.
-pub(super) fn array_bytes(aov: Aov, dimension: usize) -> u64 {
-    let bytes = if dimension == 3 { aov.bytes::<3>() } else { aov.bytes::<4>() };
+pub(super) fn array_bytes(aov: Aov, dimension: Dimension) -> u64 {
+    let bytes = match dimension {
+        Dimension::Three => aov.bytes::<3>(),
+        Dimension::Four => aov.bytes::<4>(),
+    };
     bytes as u64
 }
 
@@ -351,15 +358,15 @@ fn scene_and_occlusion(
     }
 }
 
-fn dimensions(path: &str, given: &[u64], dimension: usize) -> Result<[usize; 3], Invalid> {
+fn dimensions(path: &str, given: &[u64], dimension: Dimension) -> Result<[usize; 3], Invalid> {
     let three = match (dimension, given) {
-        (3, &[x, y]) | (3, &[x, y, 1]) => [x, y, 1],
-        (4, &[x, y, z]) => [x, y, z],
-        (3, _) => {
+        (Dimension::Three, &[x, y]) | (Dimension::Three, &[x, y, 1]) => [x, y, 1],
+        (Dimension::Four, &[x, y, z]) => [x, y, z],
+        (Dimension::Three, _) => {
             let message = format!("expected [WIDTH, HEIGHT] for a 3D scene, found {given:?}");
             return Err(Invalid::new(path, message));
         }
-        _ => {
+        (Dimension::Four, _) => {
             let message = format!("expected [WIDTH, HEIGHT, DEPTH] for a 4D scene, found {given:?}");
             return Err(Invalid::new(path, message));
         }

@@ -13,6 +13,7 @@ use super::camera::camera;
 use super::describe::{Counts, grouped};
 use super::render::RenderPlan;
 use super::{Invalid, LeftOut, Plan, Ref, Resolver, Stage};
+use crate::geometry::Dimension;
 use crate::mesh::{Mesh, MeshBuilder, Orientation};
 use crate::scene::{self, ObjectSpec, build_object_with_notes};
 
@@ -37,8 +38,8 @@ pub struct SceneSpec {
 /// Objects in space, as understood.
 #[derive(Clone, Debug, Serialize)]
 pub struct ScenePlan {
-    /// 3 or 4.
-    pub dimension: usize,
+    /// The space it is in.
+    pub dimension: Dimension,
     /// What is in it.
     pub objects: Vec<ObjectSpec>,
     /// The eye of the first render of this scene, for open objects that are to face it.
@@ -57,12 +58,9 @@ impl Stage for ScenePlan {
     }
 
     fn resolve(spec: &SceneSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let dimension = match spec.dimension {
-            None | Some(4) => 4,
-            Some(3) => 3,
-            Some(other) => {
-                return Err(Invalid::new(format!("{path}.dimension"), format!("expected 3 or 4, found {other}")));
-            }
+        let number = spec.dimension.unwrap_or(4);
+        let Some(dimension) = Dimension::new(number) else {
+            return Err(Invalid::new(format!("{path}.dimension"), format!("expected 3 or 4, found {number}")));
         };
         let objects = format!("{path}.objects");
         if spec.objects.is_empty() {
@@ -107,7 +105,7 @@ impl Stage for ScenePlan {
         let counts = (counts.get(me.nth()))
             .map(|c| format!(", {} vertices, {} simplices", grouped(c.vertices), grouped(c.simplices)));
         let noun = if objects.len() == 1 { "object" } else { "objects" };
-        format!("{dimension}D, {} {noun}{}", objects.len(), counts.unwrap_or_default())
+        format!("{}D, {} {noun}{}", dimension.get(), objects.len(), counts.unwrap_or_default())
     }
 
     fn show(fields: &mut Map<String, Value>) {
@@ -137,8 +135,8 @@ impl AnyMesh {
     /// Whatever is wrong with an object, at the key to blame.
     pub fn build(plan: &Plan, scene: Ref<ScenePlan>, notes: &mut Vec<String>) -> Result<Self, Invalid> {
         match plan[scene].dimension {
-            3 => build(plan, scene, notes).map(Self::Three),
-            _ => build(plan, scene, notes).map(Self::Four),
+            Dimension::Three => build(plan, scene, notes).map(Self::Three),
+            Dimension::Four => build(plan, scene, notes).map(Self::Four),
         }
     }
 
@@ -184,7 +182,8 @@ pub fn build<const D: usize>(plan: &Plan, scene: Ref<ScenePlan>, notes: &mut Vec
             },
         };
         let color = object.color.rgb().map_err(blame)?;
-        builder.add(&name, color, &surface, open).map_err(|e| refuse("", e.to_string()))?;
+        let crease = object.crease().map_err(blame)?;
+        builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
     }
     Ok(builder.finish())
 }

@@ -2,18 +2,18 @@
 //!
 //! What is measured, each in a file of its own:
 //!
-//! - [`ladder`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A rung is repeated with other
-//!   seeds until it has traced [`ladder::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
+//! - [`convergence`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A level is repeated with other
+//!   seeds until it has traced [`convergence::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
 //! - [`pictures`]: what becomes of the values in an image: `flat` and `smooth` shading against the value of each visible
 //!   point itself;
 //! - [`precision`]: on how many rays plain Cramer's rule, in `f32` and in `f64`, says something else than exact signs; and
-//!   what each slip of the published algorithm does to its values.
+//!   what each deviation of the published algorithm does to its values.
 //!
 //! All is about the vertices or voxels of one scene: that of the pipeline's first `occlusion`. Of a large one some are
 //! taken, evenly spread. How much is computed is bounded by counts, never by the clock, so that the same pipeline gives the
 //! same errors everywhere; only times differ.
 
-mod ladder;
+mod convergence;
 mod pictures;
 mod plot;
 mod precision;
@@ -34,9 +34,9 @@ use crate::stages::occlusion::{OcclusionPlan, OcclusionSource};
 use crate::stages::render::RenderPlan;
 use crate::stages::scene::{AnyMesh, ScenePlan};
 use crate::stages::write::write_whole;
-use ladder::{Bench, Rung, Truth};
+use convergence::{Bench, Level, Truth};
 use pictures::Pictures;
-use precision::{Differing, SlipEffect};
+use precision::{DeviationEffect, Differing};
 
 /// What a study found.
 #[derive(Clone, Debug)]
@@ -50,8 +50,8 @@ pub struct Study {
     threads: usize,
     seed: u64,
     truth: Truth,
-    rungs: Vec<Rung>,
-    slips: Vec<SlipEffect>,
+    levels: Vec<Level>,
+    deviations: Vec<DeviationEffect>,
     differing: Vec<Differing>,
     pictures: Option<Pictures>,
     notes: Vec<String>,
@@ -128,11 +128,11 @@ fn of_mesh<const D: usize>(
     let mesh = tracer.mesh();
     let Some(bench) = Bench::new(Arc::clone(&tracer), seed) else { return Ok(None) };
     let truth = bench.truth(progress)?;
-    let mut rungs = Vec::new();
-    for contender in ladder::CONTENDERS {
-        rungs.extend(bench.climb(contender, &truth, progress)?);
+    let mut levels = Vec::new();
+    for config in convergence::CONFIGS {
+        levels.extend(bench.converge(config, &truth, progress)?);
     }
-    let slips = precision::slips(&bench, &truth, progress)?;
+    let deviations = precision::deviations(&bench, &truth, progress)?;
     let differing = precision::differing(&tracer, seed, progress)?;
     let render = pipeline.plan.all::<RenderPlan>().find(|(_, r)| r.scene == scene && r.occlusion.is_some());
     let pictures = render
@@ -147,8 +147,8 @@ fn of_mesh<const D: usize>(
         threads: rayon::current_num_threads(),
         seed,
         truth,
-        rungs,
-        slips,
+        levels,
+        deviations,
         differing,
         pictures,
         notes: Vec::new(),

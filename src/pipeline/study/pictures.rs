@@ -79,7 +79,7 @@ pub fn measure<const D: usize>(
     let by_rays = |samples| Estimator::Sampled(Sampling::new(samples, seed));
     let vertex_samples = [16, 64, 256, 1024];
     let voxel_samples = [16, 64, 256];
-    progress.begin("study: pictures", (2 * vertex_samples.len() + voxel_samples.len() + 1) as u64);
+    let _running = progress.stage("study: pictures", (2 * vertex_samples.len() + voxel_samples.len() + 1) as u64);
     let small = tracer.mesh().simplices.len() <= EXACT_UP_TO;
     let (reference, name) = match small.then(|| image(Shading::Voxel(Estimator::Exact(BUDGET)))) {
         Some(Ok(arrays)) => (arrays, "exact at each visible point".to_owned()),
@@ -118,7 +118,6 @@ pub fn measure<const D: usize>(
         let (arrays, seconds) = timed(|| image(Shading::Voxel(by_rays(samples))))?;
         add("voxel", samples, seconds, &arrays);
     }
-    progress.end();
     let pictures = Pictures { render: id.to_owned(), dimensions, seen: seen.len(), reference: name, rows };
     Ok((pictures.seen > 0).then_some(pictures))
 }

@@ -15,6 +15,7 @@ use super::super::Error;
 use super::super::numbers::{AXES, OneOrEach, point, subdivisions};
 use super::march::Layers;
 use super::{Seen, Side};
+use crate::geometry::Dimension;
 use crate::io::image::{self, ByteOrder, Image, Number, Request, Slices};
 
 /// The key in the pipeline.
@@ -116,22 +117,24 @@ impl ImageSpec {
         let key = format!("{KEY}.{}", if self.file.is_some() { "file" } else { "files" });
         let Image { header, slices } = image::open(&key, folder, &files, &request)?;
         let mut positions: [Vec<f64>; D] = std::array::from_fn(|axis| header.positions[axis].clone());
-        let frame = match (D, self.frame, header.points[3]) {
-            (3, frame, frames) if frame.unwrap_or(0) >= frames => {
+        let frame = match (Dimension::of::<D>(), self.frame, header.points[3]) {
+            (Dimension::Three, frame, frames) if frame.unwrap_or(0) >= frames => {
                 return Err(wrong("frame", format!("there are {frames}, counted from 0")));
             }
-            (3, None, 2..) => {
+            (Dimension::Three, None, 2..) => {
                 let frames = header.points[3];
                 return Err(wrong("frame", format!("the image has {frames} steps of time; say which one, from 0")));
             }
-            (3, frame, _) => frame.unwrap_or(0),
-            (_, Some(_), _) => return Err(wrong("frame", "only a scene of dimension 3 takes a single frame".into())),
-            _ => 0,
+            (Dimension::Three, frame, _) => frame.unwrap_or(0),
+            (Dimension::Four, Some(_), _) => {
+                return Err(wrong("frame", "only a scene of dimension 3 takes a single frame".into()));
+            }
+            (Dimension::Four, None, 1) => {
+                let message = "the image has one step of time only; take dimension: 3, files, or dimensions";
+                return Err(Error::invalid(KEY, message));
+            }
+            (Dimension::Four, None, _) => 0,
         };
-        if D == 4 && header.points[3] == 1 {
-            let message = "the image has one step of time only; take dimension: 3, files, or dimensions";
-            return Err(Error::invalid(KEY, message));
-        }
         self.place(&mut positions)?;
         let (from, to) = self.crop(&positions)?;
         let factors = match &self.downsample {
@@ -157,7 +160,7 @@ impl ImageSpec {
         }
         let layers = ImageLayers {
             slices,
-            skip: frame * header.points[2] + from[D - 1] * if D == 4 { header.points[2] } else { 1 },
+            skip: frame * header.points[2] + from[D - 1] * slices_a_layer::<D>(&header.points),
             points: std::array::from_fn(|axis| positions[axis].len()),
             from,
             to,
@@ -230,6 +233,14 @@ fn kernel(sigma: f64) -> Vec<f64> {
     (0..=reach).map(|i| if i == 0 { 1.0 } else { libm::exp(-0.5 * (f64::from(i) / sigma).powi(2)) }).collect()
 }
 
+/// How many slices of an image one layer of the grid is: one in 3D, in 4D a whole step of time.
+fn slices_a_layer<const D: usize>(points: &[usize]) -> usize {
+    match Dimension::of::<D>() {
+        Dimension::Three => 1,
+        Dimension::Four => points[2],
+    }
+}
+
 /// An image, layer by layer.
 pub struct ImageLayers<const D: usize> {
     slices: Box<dyn Slices>,
@@ -270,11 +281,11 @@ impl<const D: usize> ImageLayers<D> {
         }
         let (mut sums, mut counts) = (vec![0f64; size], vec![0u32; size]);
         let mut numbers = 0u64;
-        let slices = if D == 4 { self.points[2] } else { 1 };
+        let slices = slices_a_layer::<D>(&self.points);
         for _ in 0..self.factors[D - 1] {
             for z in 0..slices {
                 let slice = self.slice()?;
-                let Some(z) = (if D == 4 { self.place(2, z) } else { Some(0) }) else { continue };
+                let Some(z) = self.place_in_layer(z) else { continue };
                 for (y, row) in slice.chunks_exact(self.points[0]).enumerate() {
                     let Some(y) = self.place(1, y) else { continue };
                     let start = self.sizes[0] * (y + self.sizes[1] * z);
@@ -304,11 +315,11 @@ impl<const D: usize> ImageLayers<D> {
     fn read_as_it_is(&mut self, size: usize) -> Result<Vec<f32>, Error> {
         let (width, area) = (self.sizes[0], self.sizes[0] * self.sizes[1]);
         let mut layer = vec![0f32; size];
-        for z in 0..if D == 4 { self.points[2] } else { 1 } {
+        for z in 0..slices_a_layer::<D>(&self.points) {
             let slice = self.slice()?;
-            let Some(z) = (if D == 4 { self.place(2, z) } else { Some(0) }) else { continue };
+            let Some(z) = self.place_in_layer(z) else { continue };
             let (isovalue, sign, from, points) = (self.isovalue, self.sign, self.from, self.points);
-            let rows = if D == 4 { &mut layer[z * area..][..area] } else { &mut layer[..] };
+            let rows = &mut layer[z * area..][..area];
             rows.par_chunks_mut(width).with_min_len(64).enumerate().for_each(|(y, row)| {
                 let start = (y + from[1]) * points[0] + from[0];
                 row.iter_mut()
@@ -325,6 +336,14 @@ impl<const D: usize> ImageLayers<D> {
     fn place(&self, axis: usize, index: usize) -> Option<usize> {
         let place = index.checked_sub(self.from[axis])? / self.factors[axis];
         (index < self.to[axis] && place < self.sizes[axis]).then_some(place)
+    }
+
+    /// The same for a slice within a layer. In 3D a layer is one slice.
+    fn place_in_layer(&self, z: usize) -> Option<usize> {
+        match Dimension::of::<D>() {
+            Dimension::Three => Some(z),
+            Dimension::Four => self.place(2, z),
+        }
     }
 
     /// The next layer, smoothed within itself.

@@ -24,6 +24,7 @@ use super::occlusion;
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
 use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use crate::geometry::Dimension;
 use crate::io::{AtomicFile, Error};
 use crate::mesh::Mesh;
 use crate::occlusion::Estimates;
@@ -59,12 +60,12 @@ trait OutputFormat {
     }
 
     /// Bytes of its numbers a voxel of the image, before compression, for scenes of this dimension.
-    fn voxel_bytes(_write: &WritePlan, _dimension: usize) -> u64 {
+    fn voxel_bytes(_write: &WritePlan, _dimension: Dimension) -> u64 {
         0
     }
 
     /// Bytes a voxel that the disk must have left, as far as they are known before.
-    fn disk_bytes(write: &WritePlan, dimension: usize) -> u64 {
+    fn disk_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
         Self::voxel_bytes(write, dimension)
     }
 
@@ -156,11 +157,11 @@ macro_rules! formats {
                 match self { $(Self::$name => <$key::$name>::TELLS_PIPELINE),+ }
             }
 
-            fn voxel_bytes(self, write: &WritePlan, dimension: usize) -> u64 {
+            fn voxel_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
                 match self { $(Self::$name => <$key::$name>::voxel_bytes(write, dimension)),+ }
             }
 
-            fn disk_bytes(self, write: &WritePlan, dimension: usize) -> u64 {
+            fn disk_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
                 match self { $(Self::$name => <$key::$name>::disk_bytes(write, dimension)),+ }
             }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Content, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
+use crate::geometry::Dimension;
 use crate::io::raw::RawWriter;
 use crate::io::{AtomicFile, Error};
 use crate::render::Aov;
@@ -23,7 +24,7 @@ impl OutputFormat for Raw {
         vec![Aov::Rgb]
     }
 
-    fn voxel_bytes(_: &WritePlan, dimension: usize) -> u64 {
+    fn voxel_bytes(_: &WritePlan, dimension: Dimension) -> u64 {
         array_bytes(Aov::Rgb, dimension)
     }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, VoxelFile, WritePlan};
+use crate::geometry::Dimension;
 use crate::io::vti::{self, ArraySpec, VtiWriter};
 use crate::io::{AtomicFile, Error};
 use crate::render::Aov;
@@ -24,13 +25,13 @@ impl OutputFormat for Vti {
         write.arrays.clone()
     }
 
-    fn voxel_bytes(write: &WritePlan, dimension: usize) -> u64 {
+    fn voxel_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
         write.arrays.iter().map(|&channel| array_bytes(channel, dimension)).sum()
     }
 
     /// How far compression gets is not known before, so compressed files count as nothing, and are refused by the
     /// disk itself if it comes to that.
-    fn disk_bytes(write: &WritePlan, dimension: usize) -> u64 {
+    fn disk_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
         let arrays = Self::voxel_bytes(write, dimension);
         match (write.compression, write.encoding) {
             (Compression::None, Encoding::Appended) => arrays,
@@ -68,8 +69,11 @@ impl VoxelFile for File {
     }
 }
 
-fn array_spec(aov: Aov, dimension: usize) -> ArraySpec {
-    let components = if dimension == 3 { aov.components::<3>() } else { aov.components::<4>() };
+fn array_spec(aov: Aov, dimension: Dimension) -> ArraySpec {
+    let components = match dimension {
+        Dimension::Three => aov.components::<3>(),
+        Dimension::Four => aov.components::<4>(),
+    };
     ArraySpec::new(aov.name(), aov.kind(), components)
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Content, LeftOut, OutputFormat};
-use crate::geometry::{Vector, widen};
+use crate::geometry::{Dimension, Vector, widen};
 use crate::io::{AtomicFile, Error, vtu};
 use crate::mesh::Mesh;
 use crate::occlusion::Estimates;
@@ -29,13 +29,14 @@ impl OutputFormat for Vtu {
         let mut before = vec![true; mesh.vertices.len()];
         let mut points = vec![[0.0f32; 3]; mesh.vertices.len()];
         for (i, vertex) in mesh.vertices.iter().enumerate() {
-            if D == 3 {
-                points[i] = std::array::from_fn(|a| vertex[a]);
-            } else {
-                let (image, distance) = camera.project(vertex);
-                let image = image.map(|x| x as f32);
-                before[i] = distance > 0.0 && image.iter().all(|x| x.is_finite());
-                points[i] = if before[i] { image } else { [0.0; 3] };
+            match Dimension::of::<D>() {
+                Dimension::Three => points[i] = std::array::from_fn(|a| vertex[a]),
+                Dimension::Four => {
+                    let (image, distance) = camera.project(vertex);
+                    let image = image.map(|x| x as f32);
+                    before[i] = distance > 0.0 && image.iter().all(|x| x.is_finite());
+                    points[i] = if before[i] { image } else { [0.0; 3] };
+                }
             }
         }
         let shown: Vec<usize> =
@@ -60,12 +61,17 @@ impl OutputFormat for Vtu {
             }
         }
         let mut file = AtomicFile::create(path)?;
-        if D == 3 {
-            let cells: Vec<[u32; 3]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
-            vtu::write(&mut file, &points, vtu::Cells::Triangles(&cells), &arrays, &[])
-        } else {
-            let cells: Vec<[u32; 4]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
-            vtu::write(&mut file, &points, vtu::Cells::Tetrahedra(&cells), &arrays, &[])
+        match Dimension::of::<D>() {
+            Dimension::Three => {
+                let cells: Vec<[u32; 3]> =
+                    shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+                vtu::write(&mut file, &points, vtu::Cells::Triangles(&cells), &arrays, &[])
+            }
+            Dimension::Four => {
+                let cells: Vec<[u32; 4]> =
+                    shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+                vtu::write(&mut file, &points, vtu::Cells::Tetrahedra(&cells), &arrays, &[])
+            }
         }
         .map_err(AtomicFile::name_in(path))?;
         Ok((file.commit()?, mesh.simplices.len() - shown.len()))
