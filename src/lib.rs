@@ -28,6 +28,8 @@ pub mod pipeline;
 pub mod progress;
 pub mod render;
 pub mod scene;
+pub mod session;
+pub mod stages;
 pub mod text;
 pub mod trace;
 pub mod volume;

@@ -19,6 +19,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
+use ao4d::pipeline::RunError;
 use ao4d::text::for_terminal;
 use clap::{Parser, Subcommand};
 
@@ -81,6 +82,16 @@ impl Failure {
 impl From<ao4d::pipeline::Error> for Failure {
     fn from(error: ao4d::pipeline::Error) -> Self {
         Failure::Refused(Box::new(error))
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Refused(error) => Failure::Refused(Box::new(error)),
+            RunError::Cancelled(_) => Failure::Cancelled,
+            error => Failure::Failed(Box::new(error)),
+        }
     }
 }
 

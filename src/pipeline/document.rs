@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use super::error::{Error, Invalid, Place, Refusal};
+use super::error::{Error, Place, Refusal};
 use super::overrides;
 use super::yaml::{self, Node, Origin, Problem, Segment, Value};
+use crate::stages::Invalid;
 
 /// Larger files are refused. A scene of that size belongs into a mesh file.
 const MAX_BYTES: u64 = 64 << 20;

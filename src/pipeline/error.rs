@@ -78,22 +78,3 @@ impl fmt::Display for Place {
         }
     }
 }
-
-/// A complaint about the value at a path, raised by a check that knows no lines.
-///
-/// [`Document::refuse`](super::Document::refuse) finds the line.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{path}: {message}")]
-pub struct Invalid {
-    /// The dotted path, such as `stages[1].render.dimensions[0]`.
-    pub path: String,
-    /// What is wrong, what was expected, what to do.
-    pub message: String,
-}
-
-impl Invalid {
-    /// About the value at `path`.
-    pub fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
-        Invalid { path: path.into(), message: message.into() }
-    }
-}

@@ -13,11 +13,10 @@
 
 use super::suggest;
 use super::yaml::{self, Entry, Node, Origin, Problem, Segment, Value, shorten};
+use crate::stages::KINDS;
 
 /// The pipeline's own keys.
 pub(super) const TOP_KEYS: [&str; 3] = ["name", "seed", "stages"];
-/// The kinds of stage, as the pipeline's text names them.
-pub(super) const KINDS: [&str; 5] = ["scene", "occlusion", "render", "write", "paraview"];
 
 /// Applies one assignment to the tree. A refusal without a place is about the assignment itself.
 pub(super) fn apply(root: &mut Node, assignment: &str, origin: Origin) -> Result<(), Problem> {

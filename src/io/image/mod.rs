@@ -118,6 +118,14 @@ pub struct Request {
     pub channel: usize,
 }
 
+/// The files that are read besides this one: those that it names.
+pub fn data_files(path: &Path) -> Vec<PathBuf> {
+    let name = path.to_string_lossy().to_lowercase();
+    // Opening anything but a file could wait for ever.
+    let header = path.is_file() && (name.ends_with(".nrrd") || name.ends_with(".nhdr"));
+    if header { nrrd::data_files(path) } else { Vec::new() }
+}
+
 /// Opens an image, or several as one with the files following each other in time.
 ///
 /// # Errors

@@ -74,6 +74,20 @@ pub(super) fn open(path: &Path, _: u64, _: &Request) -> Result<Image, String> {
     Ok(Image { header: Header::even(points, [0.0; 4], spacing), slices: Box::new(slices) })
 }
 
+/// The file besides the header that values are read from, if there is one.
+pub(super) fn data_files(path: &Path) -> Vec<PathBuf> {
+    use std::io::Read;
+    let mut start = Vec::new();
+    let read = stream(path, 0, false).map(|file| file.take(LONGEST as u64).read_to_end(&mut start));
+    if !matches!(read, Ok(Ok(_))) {
+        return Vec::new();
+    }
+    let text = String::from_utf8_lossy(header(&start).0).replace('\r', "");
+    let named = text.lines().filter(|line| !line.starts_with('#')).filter_map(|line| line.split_once(':'));
+    let named = named.filter(|(key, _)| ["data file", "datafile"].contains(&key.trim()));
+    named.map(|(_, name)| path.parent().unwrap_or(Path::new("")).join(name.trim())).collect()
+}
+
 /// The header, and where the values begin if it has an end.
 fn header(start: &[u8]) -> (&[u8], Option<usize>) {
     for (i, &byte) in start.iter().enumerate() {

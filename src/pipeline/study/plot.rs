@@ -79,19 +79,19 @@ fn lines(points: impl Iterator<Item = (&'static str, [f64; 2])>) -> Vec<Line> {
 
 /// The whole picture.
 pub(super) fn svg(study: &Study) -> String {
-    let rungs = || study.rungs.iter();
+    let levels = || study.levels.iter();
     let mut panels = vec![
         Panel {
             title: "RMS error against rays",
             across: ("rays a vertex", Ticks::Rays),
-            lines: lines(rungs().map(|r| (r.method, [f64::from(r.samples), r.errors.rms]))),
+            lines: lines(levels().map(|r| (r.method, [f64::from(r.samples), r.errors.rms]))),
             slope: Some("random"),
             upright: None,
         },
         Panel {
             title: "RMS error against time",
             across: ("time a vertex, on one thread", Ticks::Time),
-            lines: lines(rungs().map(|r| (r.method, [r.seconds, r.errors.rms]))),
+            lines: lines(levels().map(|r| (r.method, [r.seconds, r.errors.rms]))),
             slope: Some("random"),
             upright: study.truth.seconds.map(|s| (s, "exact")),
         },

@@ -88,6 +88,12 @@ impl ImageSpec {
         self.file.iter().chain(&self.files).map(PathBuf::as_path)
     }
 
+    /// All files it reads, those among them that other files name; `folder` is the pipeline's.
+    pub fn input_files(&self, folder: &Path) -> Vec<PathBuf> {
+        let files = self.files().map(|file| folder.join(file));
+        files.flat_map(|file| [image::data_files(&file), vec![file]].concat()).collect()
+    }
+
     /// Opens the image, and finds where the points are that remain of it.
     pub fn open<const D: usize>(
         &self,

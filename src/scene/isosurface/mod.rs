@@ -13,7 +13,7 @@ pub mod image;
 pub mod march;
 pub mod table;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -92,10 +92,10 @@ pub struct GridSpec {
 }
 
 impl IsosurfaceSpec {
-    /// The files it is read from, as the pipeline names them.
-    pub fn input_files(&self) -> Vec<&Path> {
+    /// The files it is read from, those among them that only a header names; paths are relative to `folder`.
+    pub fn input_files(&self, folder: &Path) -> Vec<PathBuf> {
         match &self.field {
-            Field::Image(image) => image.files().collect(),
+            Field::Image(image) => image.input_files(folder),
             _ => Vec::new(),
         }
     }

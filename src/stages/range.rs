@@ -1,7 +1,6 @@
 //! Ranges of numbers that several stages share.
 
-use super::{MAX_LENGTH, MIN_LENGTH};
-use crate::pipeline::error::Invalid;
+use super::{Invalid, MAX_LENGTH, MIN_LENGTH};
 use crate::text::number;
 
 /// A length above zero, of a sane size.

@@ -17,7 +17,7 @@ use crate::trace::{Sampler, Sampling, ShadingPoint};
 
 /// At most so many vertices are looked at.
 const VERTICES: usize = 200;
-/// A rung is repeated until so many rays were traced, but not more often than [`REPETITIONS`].
+/// A level is repeated until so many rays were traced, but not more often than [`REPETITIONS`].
 pub const RAYS: usize = 1 << 19;
 const REPETITIONS: usize = 128;
 /// Where exact values would take more than this, about a tenth of a second, a long run stands for them.
@@ -29,17 +29,17 @@ const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A method that is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contender {
+pub struct Config {
     /// As the pipeline calls it.
     pub name: &'static str,
-    way: Way,
+    kind: Kind,
     /// The most rays a vertex.
     most: u32,
 }
 
-/// What computes a contender's values.
+/// What computes a config's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
+enum Kind {
     /// Cosine-weighted rays.
     Rays(Sampler),
     /// The closed form where it is cheap, Sobol points elsewhere.
@@ -49,11 +49,11 @@ enum Way {
 }
 
 /// In the order of the tables.
-pub const CONTENDERS: [Contender; 4] = [
-    Contender { name: "as_published", way: Way::Published, most: 1 << 12 },
-    Contender { name: "random", way: Way::Rays(Sampler::Random), most: 1 << 16 },
-    Contender { name: "sobol", way: Way::Rays(Sampler::Sobol), most: 1 << 16 },
-    Contender { name: "adaptive", way: Way::Adaptive, most: 1 << 16 },
+pub const CONFIGS: [Config; 4] = [
+    Config { name: "as_published", kind: Kind::Published, most: 1 << 12 },
+    Config { name: "random", kind: Kind::Rays(Sampler::Random), most: 1 << 16 },
+    Config { name: "sobol", kind: Kind::Rays(Sampler::Sobol), most: 1 << 16 },
+    Config { name: "adaptive", kind: Kind::Adaptive, most: 1 << 16 },
 ];
 
 /// What is taken for true.
@@ -80,7 +80,7 @@ struct Found {
 
 /// A method with so many rays.
 #[derive(Clone, Debug)]
-pub struct Rung {
+pub struct Level {
     pub method: &'static str,
     pub samples: u32,
     /// With how many seeds.
@@ -112,7 +112,7 @@ impl<const D: usize> Bench<D> {
 
     /// The true values.
     pub fn truth(&self, progress: &dyn Progress) -> Result<Truth, RunError> {
-        progress.begin("study: exact", self.vertices.len() as u64);
+        let _running = progress.stage("study: exact", self.vertices.len() as u64);
         let found: Result<Vec<Found>, RunError> = self
             .vertices
             .par_iter()
@@ -137,7 +137,6 @@ impl<const D: usize> Bench<D> {
                 }
             })
             .collect();
-        progress.end();
         let found = found?;
         let exact: Vec<f64> = found.iter().filter_map(|f| f.seconds).collect();
         Ok(Truth {
@@ -153,24 +152,24 @@ impl<const D: usize> Bench<D> {
         Sampling { sampler, ..Sampling::new(samples, seed) }
     }
 
-    /// A method on all its rungs: 16 rays, 64, and so on.
-    pub fn climb(&self, contender: Contender, truth: &Truth, progress: &dyn Progress) -> Result<Vec<Rung>, RunError> {
-        let rungs: Vec<u32> = (2..).map(|k| 1 << (2 * k)).take_while(|&samples| samples <= contender.most).collect();
-        progress.begin(&format!("study: {}", contender.name), rungs.len() as u64);
-        let climbed = rungs.into_iter().map(|samples| {
+    /// A method on all its levels: 16 rays, 64, and so on.
+    pub fn converge(&self, config: Config, truth: &Truth, progress: &dyn Progress) -> Result<Vec<Level>, RunError> {
+        let levels: Vec<u32> = (2..).map(|k| 1 << (2 * k)).take_while(|&samples| samples <= config.most).collect();
+        let _running = progress.stage(&format!("study: {}", config.name), levels.len() as u64);
+        let measured = levels.into_iter().map(|samples| {
             if progress.cancelled() {
                 return Err(Cancelled.into());
             }
-            let repetitions = match contender.way {
+            let repetitions = match config.kind {
                 // The same again, mostly, and expensive.
-                Way::Adaptive => 1,
+                Kind::Adaptive => 1,
                 _ => (RAYS / samples as usize / self.vertices.len()).clamp(1, REPETITIONS),
             };
-            let (found, seconds) = self.values(contender, samples, repetitions, progress)?;
+            let (found, seconds) = self.values(config, samples, repetitions, progress)?;
             progress.advance(1);
             let pairs = found.values.iter().zip(truth.values.iter().cycle());
-            Ok(Rung {
-                method: contender.name,
+            Ok(Level {
+                method: config.name,
                 samples,
                 repetitions,
                 errors: Errors::of(pairs.map(|(value, truth)| f64::from(*value) - truth)),
@@ -179,15 +178,14 @@ impl<const D: usize> Bench<D> {
                     * rayon::current_num_threads() as f64,
             })
         });
-        let climbed = climbed.collect();
-        progress.end();
-        climbed
+        let measured = measured.collect();
+        measured
     }
 
     /// All vertices' values, repetition after repetition, and the rays asked in all; and the seconds a vertex and thread.
     fn values(
         &self,
-        contender: Contender,
+        config: Config,
         samples: u32,
         repetitions: usize,
         progress: &dyn Progress,
@@ -201,19 +199,19 @@ impl<const D: usize> Bench<D> {
         let backend = CpuBackend::new(Arc::clone(&self.tracer));
         let points: Vec<ShadingPoint<D>> = tasks.iter().map(|task| ShadingPoint::Vertex(task.1)).collect();
         let start = Instant::now();
-        let found: Result<Estimates, RunError> = match contender.way {
-            Way::Rays(sampler) => {
+        let found: Result<Estimates, RunError> = match config.kind {
+            Kind::Rays(sampler) => {
                 let value = |packets: &mut PacketTracer<D>, (&(repetition, _), point): (&(usize, u32), _)| {
                     let sampling = self.sampling(sampler, samples, repetition);
                     Ok(packets.estimate(&self.tracer, point, &sampling, progress)?.value)
                 };
                 tasks.par_iter().zip(&points).map_init(PacketTracer::default, value).collect::<Result<_, _>>().map(all)
             }
-            Way::Adaptive => {
+            Kind::Adaptive => {
                 let estimator = Estimator::Adaptive(self.sampling(Sampler::Sobol, samples, 0));
                 Ok(estimator.estimate(&backend, &points, None, &Unheard(progress))?)
             }
-            Way::Published => {
+            Kind::Published => {
                 let published = AsPublished::new(&self.tracer, Deviations::PUBLISHED);
                 let value = |&(repetition, vertex): &(usize, u32)| {
                     Ok(published.at_vertex(vertex, &self.sampling(Sampler::Random, samples, repetition), progress)?)

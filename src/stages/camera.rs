@@ -4,16 +4,48 @@
 //! degrees: the image then lies in the hyperplane through the origin and covers -1 to 1 (thesis 4.6.1). `up` and
 //! `over` only have to be independent of the line of sight and of each other; the renderer makes them orthogonal.
 
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use super::Invalid;
 use super::range::{check_length, positive};
-use crate::geometry::Dimension;
-use crate::pipeline::error::Invalid;
-use crate::pipeline::spec::{CameraSpec, Projection};
+use crate::geometry::{Dimension, Vector64};
+use crate::render::{self, Camera, CameraError, View};
 use crate::text::number;
 
 /// Sines of angles below this count as parallel.
 const PARALLEL: f64 = 1e-6;
+
+/// Where a scene is seen from. Vectors have as many numbers as the scene has dimensions.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSpec {
+    /// `perspective` (default) or `parallel`.
+    pub projection: Option<Projection>,
+    /// Where the eye is (default 1 along the last axis).
+    pub eye: Option<Vec<f64>>,
+    /// What it looks at (default the origin).
+    pub target: Option<Vec<f64>>,
+    /// Perspective: the angle of view in degrees, from bottom to top (default 90).
+    pub field_of_view: Option<f64>,
+    /// Parallel: the extent of the image from bottom to top, in the scene's units (default 2).
+    pub height: Option<f64>,
+    /// The direction that is up, +y in the image (default +y).
+    pub up: Option<Vec<f64>>,
+    /// In 4D the direction that is over, +z in the image (default +z).
+    pub over: Option<Vec<f64>>,
+}
+
+/// How rays leave the eye.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Projection {
+    /// From one point.
+    #[default]
+    Perspective,
+    /// All in one direction.
+    Parallel,
+}
 
 /// Where a scene is seen from, every vector with as many numbers as the scene has dimensions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -112,6 +144,24 @@ pub(super) fn plan(
         }
     };
     Ok(CameraPlan { projection, eye, target, up, over })
+}
+
+/// The camera of a plan.
+///
+/// # Errors
+/// If rounding leaves it without a frame.
+pub fn camera<const D: usize>(plan: &CameraPlan) -> Result<Camera<D>, CameraError> {
+    let vector = |v: &[f64]| Vector64::<D>::from_fn(|r, _| v[r]);
+    Camera::new(&View {
+        projection: match plan.projection {
+            ProjectionPlan::Perspective { field_of_view } => render::Projection::Perspective { field_of_view },
+            ProjectionPlan::Parallel { height } => render::Projection::Parallel { height },
+        },
+        eye: vector(&plan.eye),
+        target: vector(&plan.target),
+        up: vector(&plan.up),
+        over: plan.over.as_deref().map_or_else(Vector64::zeros, vector),
+    })
 }
 
 /// A vector of the right length, with numbers of a sane size.

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use crate::pipeline::error::Invalid;
+use super::Invalid;
 
 /// The files named so far.
 #[derive(Default)]
