@@ -134,7 +134,7 @@ impl Keys {
 /// The files that a scene reads.
 fn inputs(plan: &Plan, scene: &ScenePlan) -> Vec<PathBuf> {
     let shapes = scene.objects.iter().filter_map(|o| o.shape().ok());
-    shapes.flat_map(|s| s.input_files().into_iter().map(|f| plan.folder.join(f)).collect::<Vec<_>>()).collect()
+    shapes.flat_map(|shape| shape.input_files(&plan.folder)).collect()
 }
 
 /// The program: its version, and which build of it this is, so that a new build trusts nothing an older one made.

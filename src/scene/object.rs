@@ -152,13 +152,13 @@ impl Shape<'_> {
         }
     }
 
-    /// The files it is read from, as the pipeline names them.
-    pub fn input_files(&self) -> Vec<&Path> {
+    /// All files it is read from, those among them that other files name; `folder` is the pipeline's.
+    pub fn input_files(&self, folder: &Path) -> Vec<PathBuf> {
         match self {
-            Shape::File(path) => vec![path],
-            Shape::Extrude(spec) => vec![&spec.mesh],
-            Shape::Spin(spec) => vec![&spec.mesh],
-            Shape::Isosurface(spec) => spec.input_files(),
+            Shape::File(path) => vec![folder.join(path)],
+            Shape::Extrude(spec) => vec![folder.join(&spec.mesh)],
+            Shape::Spin(spec) => vec![folder.join(&spec.mesh)],
+            Shape::Isosurface(spec) => spec.input_files(folder),
             _ => Vec::new(),
         }
     }
