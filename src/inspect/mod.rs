@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | `.vti`, `.vtu`, `.vtp` | an image or a mesh, as [`crate::io::vtk`] reads it |
 //! | `.stl`, `.ply` | a mesh of triangles, as a scene would take it |
+//! | `.nii`, `.nrrd`, `.nc`, `.tif` | an image, described but not compared ([`image`]) |
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
 //! | `.raw` | colours without a header: only how many |
 //!
@@ -15,6 +16,7 @@
 
 pub mod compare;
 mod error;
+pub mod image;
 mod info;
 mod range;
 pub mod surface;
