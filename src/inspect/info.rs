@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::range::Short;
 use super::image::ImageSummary;
+use super::range::Short;
 use super::surface::SurfaceSummary;
 use super::{ArraySummary, COLOURS, Contents, Error, OCCLUSION, Range};
 use crate::io::vtk::{Field, Image, UnstructuredGrid, cell_name};

@@ -42,13 +42,29 @@ impl Role {
     pub fn of_name(name: &str) -> Option<Self> {
         let name = name.trim().to_lowercase();
         Some(match name.as_str() {
-            "x" | "lon" | "longitude" | "easting" | "xc" | "nx" | "rlon" | "projection_x_coordinate" | "grid_longitude" => Role::X,
-            "y" | "lat" | "latitude" | "northing" | "yc" | "ny" | "rlat" | "projection_y_coordinate" | "grid_latitude" => Role::Y,
-            "z" | "lev" | "level" | "levels" | "depth" | "height" | "altitude" | "plev" | "elevation" | "zc" | "nz" | "slice"
-            | "slices" | "air_pressure" => Role::Z,
+            "x"
+            | "lon"
+            | "longitude"
+            | "easting"
+            | "xc"
+            | "nx"
+            | "rlon"
+            | "projection_x_coordinate"
+            | "grid_longitude" => Role::X,
+            "y"
+            | "lat"
+            | "latitude"
+            | "northing"
+            | "yc"
+            | "ny"
+            | "rlat"
+            | "projection_y_coordinate"
+            | "grid_latitude" => Role::Y,
+            "z" | "lev" | "level" | "levels" | "depth" | "height" | "altitude" | "plev" | "elevation" | "zc" | "nz"
+            | "slice" | "slices" | "air_pressure" => Role::Z,
             "t" | "time" | "times" | "frame" | "frames" | "nt" | "timepoint" | "date" | "step" => Role::Time,
-            "c" | "s" | "channel" | "channels" | "component" | "components" | "band" | "bands" | "wavelength" | "sample"
-            | "samples" | "member" | "ensemble" | "realization" => Role::Channel,
+            "c" | "s" | "channel" | "channels" | "component" | "components" | "band" | "bands" | "wavelength"
+            | "sample" | "samples" | "member" | "ensemble" | "realization" => Role::Channel,
             _ => return None,
         })
     }
@@ -95,7 +111,13 @@ impl Positions {
     pub fn step(&self) -> f64 {
         match self {
             Positions::Even { step, .. } => *step,
-            Positions::Listed(list) => if list.len() > 1 { list[1] - list[0] } else { 1.0 },
+            Positions::Listed(list) => {
+                if list.len() > 1 {
+                    list[1] - list[0]
+                } else {
+                    1.0
+                }
+            }
         }
     }
 
@@ -217,7 +239,10 @@ impl Opened {
         if let Some(asked) = &request.axes {
             if asked.len() != self.axes.len() {
                 let (count, there) = (asked.len(), self.listed());
-                return Err(format!("axes names {count} axes, and there are {}, the fastest first: {there}", self.axes.len()));
+                return Err(format!(
+                    "axes names {count} axes, and there are {}, the fastest first: {there}",
+                    self.axes.len()
+                ));
             }
             return Ok(asked.iter().copied().map(Some).collect());
         }
@@ -245,7 +270,9 @@ impl Opened {
                     return Err(format!(
                         "its axis \"{}\" of {} points is none of x, y, z and time by its name or kind; \
                          say what each axis is by axes, the fastest first: they are {}",
-                        axis.name, axis.size, self.listed()
+                        axis.name,
+                        axis.size,
+                        self.listed()
                     ));
                 }
                 Some(Role::Channel) => channels.push(i),
@@ -254,7 +281,10 @@ impl Opened {
                     if let Some(other) = place.filter(|&other| self.axes[other].size > 1 && axis.size > 1) {
                         return Err(format!(
                             "its axes \"{}\" and \"{}\" are both {}; say what each axis is by axes: they are {}",
-                            self.axes[other].name, axis.name, role.name(), self.listed()
+                            self.axes[other].name,
+                            axis.name,
+                            role.name(),
+                            self.listed()
                         ));
                     }
                     if place.is_none_or(|other| self.axes[other].size == 1) {
@@ -265,14 +295,19 @@ impl Opened {
         }
         let channel = match channels.as_slice() {
             [] if request.channel.unwrap_or(0) > 0 => {
-                return Err(format!("has one channel, counted from 0; there is no channel {}", request.channel.unwrap_or(0)));
+                return Err(format!(
+                    "has one channel, counted from 0; there is no channel {}",
+                    request.channel.unwrap_or(0)
+                ));
             }
             [] => None,
             &[axis] => Some((axis, self.channel(axis, request)?)),
             &[one, two, ..] => {
                 return Err(format!(
                     "its axes \"{}\" and \"{}\" both hold several values a point; one such axis is understood: {}",
-                    self.axes[one].name, self.axes[two].name, self.listed()
+                    self.axes[one].name,
+                    self.axes[two].name,
+                    self.listed()
                 ));
             }
         };
@@ -284,14 +319,8 @@ impl Opened {
             Some(place) => self.axes[place].clone(),
             None => Axis::new(Role::GRID[i].name(), None, 1),
         });
-        let image = Image {
-            axes,
-            frame: None,
-            values,
-            space: self.space,
-            has_times: self.has_times,
-            notes: self.notes,
-        };
+        let image =
+            Image { axes, frame: None, values, space: self.space, has_times: self.has_times, notes: self.notes };
         image.placed(self.origin, request)
     }
 
@@ -304,7 +333,8 @@ impl Opened {
             }
             Some(channel) => Ok(channel),
             None if self.first_channel => {
-                self.notes.push(format!("channel: the first of {size} channels is taken ({name}); channel chooses another"));
+                self.notes
+                    .push(format!("channel: the first of {size} channels is taken ({name}); channel chooses another"));
                 Ok(0)
             }
             None => Err(format!(
@@ -350,8 +380,9 @@ impl Image {
             }
             return Ok(self);
         }
-        let mut directions: [[f64; 4]; 4] =
-            std::array::from_fn(|i| self.axes[i].direction.unwrap_or(std::array::from_fn(|k| f64::from(u8::from(i == k)))));
+        let mut directions: [[f64; 4]; 4] = std::array::from_fn(|i| {
+            self.axes[i].direction.unwrap_or(std::array::from_fn(|k| f64::from(u8::from(i == k))))
+        });
         let mut origin = origin;
         if let Some(wanted) = &request.space {
             let signs = self.turn(wanted)?;
@@ -375,12 +406,15 @@ impl Image {
 
     /// The signs that turn x, y and z as asked for.
     fn turn(&self, wanted: &str) -> Result<[f64; 3], String> {
-        let there = self.space.as_deref().ok_or("doesn't say which way its axes point, so that space can't turn them")?;
+        let there =
+            self.space.as_deref().ok_or("doesn't say which way its axes point, so that space can't turn them")?;
         let mut signs = [1.0; 3];
         for (i, (from, to)) in there.chars().zip(wanted.to_uppercase().chars()).enumerate() {
             let pair = |c: char| "RL AP SI".split(' ').position(|pair| pair.contains(c));
             if pair(from) != pair(to) {
-                return Err(format!("its axes point {there}; space can turn them round, not exchange them as {wanted} would"));
+                return Err(format!(
+                    "its axes point {there}; space can turn them round, not exchange them as {wanted} would"
+                ));
             }
             signs[i] = if from == to { 1.0 } else { -1.0 };
         }

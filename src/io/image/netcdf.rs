@@ -44,7 +44,9 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
     let roles: Vec<Option<Role>> = axes.iter().map(|axis: &Axis| axis.role).collect();
     if roles.iter().all(Option::is_none) && request.axes.is_none() && roles.len() <= 4 {
         let names = axes.iter().rev().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", ");
-        notes.push(format!("its dimensions ({names}) say nothing of what they are; they count as time, z, y, x in this order"));
+        notes.push(format!(
+            "its dimensions ({names}) say nothing of what they are; they count as time, z, y, x in this order"
+        ));
     }
     let values = Bytes::new(whole.stream(variable)?, kind, false, meaning);
     let format = match header.version {
@@ -53,7 +55,8 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
         _ => "NetCDF (CDF-5)",
     };
     let mut opened = Opened::new(format, axes, kind.vtk_name().to_lowercase(), Box::new(values));
-    opened.has_times = opened.axes.iter().any(|a| a.role == Some(Role::Time) && matches!(a.positions, Positions::Listed(_)));
+    opened.has_times =
+        opened.axes.iter().any(|a| a.role == Some(Role::Time) && matches!(a.positions, Positions::Listed(_)));
     opened.unit = variable.text("units").map(str::to_owned);
     opened.notes = notes;
     Ok(opened)
@@ -65,9 +68,10 @@ fn choose<'a>(header: &'a Header, name: Option<&str>) -> Result<&'a Variable, St
     let large: Vec<&Variable> = all.iter().filter(|v| v.dimensions.len() >= 3 && v.kind.is_some()).collect();
     let known = || all.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", ");
     match (name, large.as_slice()) {
-        (Some(name), _) => {
-            all.iter().find(|v| v.name == name).ok_or_else(|| format!("has no variable \"{name}\"; there are {}", known()))
-        }
+        (Some(name), _) => all
+            .iter()
+            .find(|v| v.name == name)
+            .ok_or_else(|| format!("has no variable \"{name}\"; there are {}", known())),
         (None, &[one]) => Ok(one),
         _ => {
             Err(format!("has {} variables with three dimensions or more; give array, one of {}", large.len(), known()))
@@ -102,10 +106,8 @@ fn as_stored(numbers: &Values, kind: Kind) -> Vec<f64> {
 }
 
 fn meaning(variable: &Variable, kind: Kind) -> Result<Meaning, String> {
-    let mut meaning = Meaning::linear(
-        variable.number("scale_factor").unwrap_or(1.0),
-        variable.number("add_offset").unwrap_or(0.0),
-    );
+    let mut meaning =
+        Meaning::linear(variable.number("scale_factor").unwrap_or(1.0), variable.number("add_offset").unwrap_or(0.0));
     if !meaning.scale.is_finite() || !meaning.shift.is_finite() {
         return Err(format!("variable \"{}\" has a scale_factor or add_offset that is not finite", variable.name));
     }
@@ -166,7 +168,9 @@ fn axis(file: &Whole, dimension: usize, size: usize, notes: &mut Vec<String>) ->
         if axis.role == Some(Role::Channel) || axis.role.is_none() {
             axis.positions = Positions::INDICES;
         } else if size > 1 {
-            return Err(format!("its dimension \"{name}\" goes back and forth, or holds no numbers; drop its coordinates: ncks -C -x -v {name}"));
+            return Err(format!(
+                "its dimension \"{name}\" goes back and forth, or holds no numbers; drop its coordinates: ncks -C -x -v {name}"
+            ));
         } else {
             notes.push(format!("its dimension \"{name}\" has one point, at no number; it counts as at 0"));
             axis.positions = Positions::INDICES;

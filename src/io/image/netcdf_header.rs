@@ -78,16 +78,24 @@ impl Header {
         let version = match bytes.as_slice() {
             [b'C', b'D', b'F', version @ (1 | 2 | 5), ..] => *version,
             [0x89, b'H', b'D', b'F', ..] => {
-                return Err("unsupported: a NetCDF-4 file, which is HDF5; convert it: nccopy -k cdf5 IN.nc OUT.nc".into());
+                return Err(
+                    "unsupported: a NetCDF-4 file, which is HDF5; convert it: nccopy -k cdf5 IN.nc OUT.nc".into()
+                );
             }
-            [0x0e, 3, 0x13, 1, ..] => return Err("unsupported: an HDF4 file; convert it to NetCDF: h4tonccf IN OUT.nc".into()),
+            [0x0e, 3, 0x13, 1, ..] => {
+                return Err("unsupported: an HDF4 file; convert it to NetCDF: h4tonccf IN OUT.nc".into());
+            }
             _ => return Err("is no NetCDF file: it begins neither with CDF nor as HDF5 does".into()),
         };
         let mut rest = Rest { bytes: &bytes[4..], wide_counts: version == 5, wide_offsets: version != 1 };
         let records = rest.count()?;
         let open = if version == 5 { u64::MAX } else { u64::from(u32::MAX) };
-        let mut header =
-            Self { version, records: Some(records).filter(|&n| n != open), dimensions: Vec::new(), variables: Vec::new() };
+        let mut header = Self {
+            version,
+            records: Some(records).filter(|&n| n != open),
+            dimensions: Vec::new(),
+            variables: Vec::new(),
+        };
         for _ in 0..rest.list()? {
             header.dimensions.push(Dimension { name: rest.name()?, size: rest.count()? });
         }

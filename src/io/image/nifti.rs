@@ -35,7 +35,10 @@ impl Header {
         let header = Self { bytes, two, little_endian };
         match &header.bytes[if two { 4..7 } else { 344..347 }] {
             b"n+1" | b"n+2" | b"ni1" | b"ni2" => Ok(header),
-            _ => Err("unsupported: an ANALYZE file, which says nothing of its place; convert it by nibabel to .nii".into()),
+            _ => {
+                Err("unsupported: an ANALYZE file, which says nothing of its place; convert it by nibabel to .nii"
+                    .into())
+            }
         }
     }
 
@@ -67,7 +70,11 @@ impl Header {
 
     /// A real number: of 4 bytes at `one`, or the `i`-th of 8 bytes at `two`.
     fn real(&self, one: usize, two: usize, i: usize) -> f64 {
-        if self.two { f64::from_le_bytes(self.take(two + 8 * i)) } else { f32::from_le_bytes(self.take(one + 4 * i)).into() }
+        if self.two {
+            f64::from_le_bytes(self.take(two + 8 * i))
+        } else {
+            f32::from_le_bytes(self.take(one + 4 * i)).into()
+        }
     }
 
     fn dim(&self, i: usize) -> i64 {
@@ -134,7 +141,10 @@ pub(super) fn data_files(path: &Path) -> Vec<PathBuf> {
 fn read_header(path: &Path) -> Result<Header, String> {
     let packing = if is_gzip(path) { Packing::Gzip } else { Packing::None };
     let mut bytes = Vec::new();
-    stream(path, 0, packing)?.take(540).read_to_end(&mut bytes).map_err(|e| format!("is cut off, or no NIfTI file: {e}"))?;
+    stream(path, 0, packing)?
+        .take(540)
+        .read_to_end(&mut bytes)
+        .map_err(|e| format!("is cut off, or no NIfTI file: {e}"))?;
     Header::new(bytes)
 }
 
@@ -151,7 +161,7 @@ pub(super) fn open(path: &Path, _: u64, request: &Request) -> Result<Opened, Str
     if let Some(i) = (6..=7).find(|&i| size(i) > 1) {
         return Err(format!("unsupported: a dimension {i} of {} points; take it apart, by nibabel say", size(i)));
     }
-    let kind = match header.code(70, 12) {
+    let kind = match header.short(if header.two { 12 } else { 70 }) {
         2 => Kind::U8,
         4 => Kind::I16,
         8 => Kind::I32,
@@ -242,7 +252,10 @@ pub(super) fn open(path: &Path, _: u64, request: &Request) -> Result<Opened, Str
         for (axis, step) in opened.axes.iter_mut().zip(steps) {
             let length = step.iter().map(|x| x * x).sum::<f64>().sqrt();
             if !(length.is_finite() && length > 0.0) {
-                return Err(format!("places its axis {} by a step of length {length}; placement: stored does without", axis.name));
+                return Err(format!(
+                    "places its axis {} by a step of length {length}; placement: stored does without",
+                    axis.name
+                ));
             }
             axis.positions = Positions::spaced(length);
             axis.direction = Some(std::array::from_fn(|r| step.get(r).map_or(0.0, |x| x / length)));

@@ -92,7 +92,8 @@ impl Fields {
         let text = String::from_utf8_lossy(value).into_owned();
         let words: Vec<&str> = text.split_whitespace().collect();
         // `name%03d.raw 1 10 1`: numbered files, from, to, step.
-        let (Some(pattern), [_, from, to, step, ..]) = (words.first().filter(|w| w.contains('%')), words.as_slice()) else {
+        let (Some(pattern), [_, from, to, step, ..]) = (words.first().filter(|w| w.contains('%')), words.as_slice())
+        else {
             return Ok(vec![folder.join(path_of(value))]);
         };
         let wrong = || format!("has the data file \"{text}\", which is not understood; name the files below LIST");
@@ -101,13 +102,15 @@ impl Fields {
         let (before, rest) = pattern.split_once('%').ok_or_else(wrong)?;
         let (width, after) = rest.split_once('d').ok_or_else(wrong)?;
         let count = if step == 0 { 0 } else { (i128::from(to) - i128::from(from)) / i128::from(step) + 1 };
-        if count < 1 || count > i128::from(MOST_FILES) || !width.chars().all(|c| c.is_ascii_digit()) || width.len() > 2 {
+        if count < 1 || count > i128::from(MOST_FILES) || !width.chars().all(|c| c.is_ascii_digit()) || width.len() > 2
+        {
             return Err(wrong());
         }
         let digits: usize = width.trim_start_matches('0').parse().unwrap_or(0);
         let numbered = |i: i128| {
             let number = i128::from(from) + i * i128::from(step);
-            let number = if width.starts_with('0') { format!("{number:0digits$}") } else { format!("{number:digits$}") };
+            let number =
+                if width.starts_with('0') { format!("{number:0digits$}") } else { format!("{number:digits$}") };
             folder.join(format!("{before}{number}{after}"))
         };
         Ok((0..count).map(numbered).collect())
@@ -169,7 +172,9 @@ fn values(
         "raw" | "txt" | "text" | "ascii" => Packing::None,
         "gzip" | "gz" => Packing::Gzip,
         other => {
-            return Err(format!("unsupported: the encoding {other}; convert it: unu save -f nrrd -e gzip -i IN -o OUT"));
+            return Err(format!(
+                "unsupported: the encoding {other}; convert it: unu save -f nrrd -e gzip -i IN -o OUT"
+            ));
         }
     };
     let text = packing == Packing::None && encoding != "raw";
@@ -329,7 +334,8 @@ fn axes(fields: &Fields, sizes: &[usize], notes: &mut Vec<String>) -> Result<(Ve
             axis.unit = space_units.get(vector.iter().position(|x| *x != 0.0).unwrap_or(0)).cloned();
         } else {
             let cells = centres.get(i).is_some_and(|centre| centre == "cell");
-            let between = |low: f64, high: f64| (high - low) / (if cells { size as f64 } else { (size as f64 - 1.0).max(1.0) });
+            let between =
+                |low: f64, high: f64| (high - low) / (if cells { size as f64 } else { (size as f64 - 1.0).max(1.0) });
             let step = told(&spacings).or_else(|| Some(between(told(&mins)?, told(&maxs)?))).unwrap_or(0.0);
             let start = told(&mins).unwrap_or(0.0) + if cells && told(&mins).is_some() { step / 2.0 } else { 0.0 };
             axis.positions = Positions::even(start, step);
@@ -421,12 +427,20 @@ fn kind(name: &str) -> Result<Kind, String> {
         "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Kind::U16,
         "int" | "signed int" | "int32" | "int32_t" => Kind::I32,
         "uint" | "unsigned int" | "uint32" | "uint32_t" => Kind::U32,
-        "longlong" | "long long" | "long long int" | "signed long long" | "signed long long int" | "int64" | "int64_t" => {
-            Kind::I64
-        }
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => Kind::I64,
         "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Kind::U64,
         "float" => Kind::F32,
         "double" => Kind::F64,
-        other => return Err(format!("unsupported: numbers of type \"{other}\"; convert it: unu convert -t float -i IN -o OUT")),
+        other => {
+            return Err(format!(
+                "unsupported: numbers of type \"{other}\"; convert it: unu convert -t float -i IN -o OUT"
+            ));
+        }
     })
 }

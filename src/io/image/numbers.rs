@@ -274,7 +274,9 @@ impl Numbers for Picked {
     fn skip(&mut self, count: u64) -> Result<(), String> {
         let (run, all) = (self.run as u64, (self.run * self.channels) as u64);
         // From the beginning of the current run on, in values of the channel; then in values of all.
-        let place = |values: u64| values / run * all + if values % run == 0 { 0 } else { self.channel as u64 * run + values % run };
+        let place = |values: u64| {
+            values / run * all + if values % run == 0 { 0 } else { self.channel as u64 * run + values % run }
+        };
         let (here, there) = (self.at as u64, self.at as u64 + count);
         self.at = (there % run) as usize;
         let passed = place(there) - place(here);
@@ -405,11 +407,13 @@ mod tests {
             let stored: Vec<usize> = axes.iter().map(|&axis| sizes[axis]).collect();
             let values = (0..120usize).map(|i| {
                 let mut rest = i;
-                axes.iter().map(|&axis| {
-                    let at = rest % sizes[axis];
-                    rest /= sizes[axis];
-                    at as f64 * weights[axis]
-                }).sum()
+                axes.iter()
+                    .map(|&axis| {
+                        let at = rest % sizes[axis];
+                        rest /= sizes[axis];
+                        at as f64 * weights[axis]
+                    })
+                    .sum()
             });
             let at = |axis: usize| axes.iter().position(|&a| a == axis).unwrap();
             let order = [at(0), at(1), at(2)];

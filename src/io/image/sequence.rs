@@ -18,7 +18,10 @@ pub(super) fn open(inputs: Vec<Input>, request: &Request) -> Result<Image, Error
     for input in &inputs[1..] {
         let other = arranged(input, request)?;
         agree(&image, &other).map_err(|what| {
-            input.wrong(format!("{what}, unlike the first file, {}; files of a sequence share one grid", first.path.display()))
+            input.wrong(format!(
+                "{what}, unlike the first file, {}; files of a sequence share one grid",
+                first.path.display()
+            ))
         })?;
         have_times &= other.has_times;
         extend(&other.axes[3]);
@@ -62,7 +65,10 @@ fn agree(first: &Image, other: &Image) -> Result<(), String> {
         // Places are often written with few digits.
         if ends.iter().zip(others).any(|(x, y)| (x - y).abs() > 1e-5 * length) {
             let name = ["x", "y", "z"][axis];
-            return Err(format!("lies from {} to {} along {name}, not from {} to {}", others[0], others[1], ends[0], ends[1]));
+            return Err(format!(
+                "lies from {} to {} along {name}, not from {} to {}",
+                others[0], others[1], ends[0], ends[1]
+            ));
         }
     }
     let near = |a: &[f64], b: &[f64], size: f64| a.iter().zip(b).all(|(x, y)| (x - y).abs() <= 1e-5 * size);

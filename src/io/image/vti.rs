@@ -22,12 +22,14 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
         return Err("holds a mesh, not an image; resample it to an image (in ParaView: Resample To Image)".into());
     };
     let (array, on_cells) = choose(&image, request.array.as_deref())?;
-    let direction = |axis: usize| std::array::from_fn(|row| if row < 3 { image.direction[3 * row + axis] } else { 0.0 });
+    let direction =
+        |axis: usize| std::array::from_fn(|row| if row < 3 { image.direction[3 * row + axis] } else { 0.0 });
     let mut origin = [image.grid.origin[0], image.grid.origin[1], image.grid.origin[2], 0.0];
     let mut axes = Vec::new();
     for (i, role) in [Role::X, Role::Y, Role::Z].into_iter().enumerate() {
         let (points, step) = (image.grid.dimensions[i], image.grid.spacing[i]);
-        let mut axis = Axis::new(role.name(), Some(role), if on_cells { (points - 1).max(1) } else { points }).spaced(step);
+        let mut axis =
+            Axis::new(role.name(), Some(role), if on_cells { (points - 1).max(1) } else { points }).spaced(step);
         let vector: [f64; 4] = direction(i);
         // Values of cells are those of their middles.
         if on_cells && points > 1 {
@@ -63,7 +65,9 @@ fn choose<'a>(image: &'a vtk::Image, name: Option<&str>) -> Result<(&'a Array, b
     let all = || image.point_arrays.iter().map(|a| (a, false)).chain(image.cell_arrays.iter().map(|a| (a, true)));
     let known = || all().map(|(array, _)| array.name.clone()).collect::<Vec<_>>().join(", ");
     if let Some(name) = name {
-        return all().find(|(array, _)| array.name == name).ok_or_else(|| format!("has no array \"{name}\"; there are {}", known()));
+        return all()
+            .find(|(array, _)| array.name == name)
+            .ok_or_else(|| format!("has no array \"{name}\"; there are {}", known()));
     }
     let meant: Vec<_> = all().filter(|(array, _)| !VTKS_OWN.contains(&array.name.as_str())).collect();
     let scalars: Vec<_> = meant.iter().filter(|(array, _)| array.components == 1).collect();

@@ -188,7 +188,10 @@ impl ImageSpec {
         check_grid(KEY, &sizes.map(|size| size as u128))?;
         if (sizes[0] * factors[0]) as u128 > MOST_IN_LAYER {
             let row = sizes[0] * factors[0];
-            return Err(wrong("crop", format!("a row of {row} points is more than {MOST_IN_LAYER}; take a part of it")));
+            return Err(wrong(
+                "crop",
+                format!("a row of {row} points is more than {MOST_IN_LAYER}; take a part of it"),
+            ));
         }
         let axes: [Vec<f64>; D] = std::array::from_fn(|axis| {
             let first = |i: usize| from[axis] + i * factors[axis];
@@ -298,9 +301,7 @@ impl<const D: usize> Placed<D> {
 
     /// Where a point is in the world.
     fn at(&self, point: &[f64; D]) -> [f64; D] {
-        std::array::from_fn(|k| {
-            self.origin[k] + (0..D).map(|axis| self.directions[axis][k] * point[axis]).sum::<f64>()
-        })
+        std::array::from_fn(|k| self.origin[k] + (0..D).map(|axis| self.directions[axis][k] * point[axis]).sum::<f64>())
     }
 
     /// Brings a surface into the world, with its outside outside.

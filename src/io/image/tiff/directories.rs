@@ -46,8 +46,7 @@ impl Directories {
             _ => return Err("is no TIFF file: its third byte is neither 42 nor 43".into()),
         };
         let (count_size, entry_size, value) = if big { (8, 20, 12) } else { (2, 12, 8) };
-        let mut found =
-            Self { count: 0, little_endian, patches: Vec::new(), has_table: false, white_is_zero: false };
+        let mut found = Self { count: 0, little_endian, patches: Vec::new(), has_table: false, white_is_zero: false };
         let mut seen = HashSet::new();
         while next != 0 {
             let wrong = |e: std::io::Error| format!("is cut off, or damaged: page {}: {e}", found.count);

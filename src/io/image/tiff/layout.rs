@@ -4,8 +4,8 @@
 
 use serde_json::Value;
 
-use super::super::axes::{Axis, Positions, Role};
 use super::super::Request;
+use super::super::axes::{Axis, Positions, Role};
 
 /// What is known of a file before its description is read.
 pub(super) struct Page<'a> {
@@ -123,7 +123,10 @@ impl Layout {
 
     fn imagej(page: &Page, text: &str) -> Result<Self, String> {
         let told = |key: &str| {
-            text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('=')).map(str::trim).filter(|v| !v.is_empty())
+            text.lines()
+                .find_map(|line| line.strip_prefix(key)?.strip_prefix('='))
+                .map(str::trim)
+                .filter(|v| !v.is_empty())
         };
         let number = |key: &str| told(key).and_then(|value| value.parse::<f64>().ok()).filter(|x| x.is_finite());
         let whole = |key: &str| number(key).map_or(1, |n| n.clamp(1.0, 1e9) as usize);
@@ -157,7 +160,9 @@ impl Layout {
             // A straight line from stored numbers to values.
             Some("0") => layout.linear = (number("c1").unwrap_or(1.0), number("c0").unwrap_or(0.0)),
             Some(other) => {
-                layout.notes.push(format!("its calibration by ImageJ's function {other} is not applied; its numbers are as stored"));
+                layout.notes.push(format!(
+                    "its calibration by ImageJ's function {other} is not applied; its numbers are as stored"
+                ));
             }
         }
         layout.unit = told("vunit").map(str::to_owned);
@@ -235,12 +240,15 @@ impl Layout {
             (None, [one]) => one,
             (None, all) => return Err(wrong(format!("has {} images; give array, one of {}", all.len(), titles()))),
         };
-        let pixels = image.children().find(|node| named(node, "Pixels")).ok_or_else(|| wrong("has no Pixels".into()))?;
+        let pixels =
+            image.children().find(|node| named(node, "Pixels")).ok_or_else(|| wrong("has no Pixels".into()))?;
         let whole = |node: &roxmltree::Node, name: &str| match node.attribute(name) {
             None => Ok(None),
             Some(text) => text.trim().parse::<usize>().map(Some).map_err(|_| wrong(format!("has {name}=\"{text}\""))),
         };
-        let real = |node: &roxmltree::Node, name: &str| node.attribute(name)?.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let real = |node: &roxmltree::Node, name: &str| {
+            node.attribute(name)?.trim().parse::<f64>().ok().filter(|x| x.is_finite())
+        };
         let size = |name: &str| whole(&pixels, name)?.ok_or_else(|| wrong(format!("has no {name}")));
         let (width, height) = (size("SizeX")?, size("SizeY")?);
         if [width, height] != [page.width, page.height] {
@@ -305,7 +313,12 @@ impl Layout {
     }
 
     /// Which page each plane is on, by `TiffData`.
-    fn planes_of_ome(&mut self, page: &Page, document: &roxmltree::Document, pixels: roxmltree::Node) -> Result<(), String> {
+    fn planes_of_ome(
+        &mut self,
+        page: &Page,
+        document: &roxmltree::Document,
+        pixels: roxmltree::Node,
+    ) -> Result<(), String> {
         let planes = self.planes();
         if planes > page.count {
             return Err(format!("its OME-XML says {planes} planes, and it has {} pages", page.count));
@@ -319,7 +332,9 @@ impl Layout {
             if let Some(uuid) = data.children().find(|node| node.is_element() && node.tag_name().name() == "UUID") {
                 let file = uuid.attribute("FileName").unwrap_or(&page.name);
                 if uuid.text().map(str::trim) != own && file != page.name {
-                    return Err(format!("unsupported: planes in another file, {file}; save it as one: bfconvert IN OUT.ome.tif"));
+                    return Err(format!(
+                        "unsupported: planes in another file, {file}; save it as one: bfconvert IN OUT.ome.tif"
+                    ));
                 }
             }
             let (mut start, mut stride) = (0usize, 1usize);
@@ -345,8 +360,9 @@ impl Layout {
                 .into_iter()
                 .enumerate()
                 .map(|(plane, at)| {
-                    at.filter(|&at| at < page.count)
-                        .ok_or_else(|| format!("its OME-XML names no page, or none that is there, for plane {plane} of {planes}"))
+                    at.filter(|&at| at < page.count).ok_or_else(|| {
+                        format!("its OME-XML names no page, or none that is there, for plane {plane} of {planes}")
+                    })
                 })
                 .collect::<Result<_, _>>()?;
         }

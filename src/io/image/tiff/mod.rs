@@ -73,20 +73,30 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
     };
     let mut layout = Layout::of(&page, request)?;
     if directories.has_table {
-        layout.notes.push("it has a table of colours, which is not applied: its numbers are read as they are stored".into());
+        layout
+            .notes
+            .push("it has a table of colours, which is not applied: its numbers are read as they are stored".into());
     }
     if directories.white_is_zero {
         layout.notes.push("it shows 0 as white; its numbers are read as they are stored".into());
     }
     let kind = number_kind(bits, format)?;
-    let size = page.width.checked_mul(page.height).and_then(|n| n.checked_mul(samples)).ok_or("has pages larger than can be")?;
+    let size = page
+        .width
+        .checked_mul(page.height)
+        .and_then(|n| n.checked_mul(samples))
+        .ok_or("has pages larger than can be")?;
     let meaning = Meaning::linear(layout.linear.0, layout.linear.1);
     let values: Box<dyn Numbers> = if directories.count == 1 && layout.planes() > 1 {
         // All planes behind the first one, as ImageJ writes stacks of more than 4 GB.
         if compression != 1 || bits < 8 || planar {
-            return Err(format!("unsupported: {} planes on one page that is packed; save it in ImageJ as pages", layout.planes()));
+            return Err(format!(
+                "unsupported: {} planes on one page that is packed; save it in ImageJ as pages",
+                layout.planes()
+            ));
         }
-        let offsets = decoder.find_tag_unsigned_vec::<u64>(Tag::StripOffsets).map_err(|e| told(&e))?.unwrap_or_default();
+        let offsets =
+            decoder.find_tag_unsigned_vec::<u64>(Tag::StripOffsets).map_err(|e| told(&e))?.unwrap_or_default();
         let start = offsets.first().copied().ok_or("is damaged: its page is nowhere")?;
         let needed = (size as u64).checked_mul(layout.planes() as u64).and_then(|n| n.checked_mul(kind.size() as u64));
         holds(needed.ok_or("declares more points than can be")?, start, length, Packing::None)?;
@@ -165,7 +175,9 @@ impl Pages {
             let samples = self.decoder.find_tag_unsigned::<u64>(Tag::SamplesPerPixel).map_err(wrong)?.unwrap_or(1);
             let size = u64::from(width) * u64::from(height) * samples;
             if size != self.size as u64 {
-                return Err(format!("page {page} has {width} x {height} points of {samples} numbers, unlike the first"));
+                return Err(format!(
+                    "page {page} has {width} x {height} points of {samples} numbers, unlike the first"
+                ));
             }
             let mut values = DecodingResult::U8(Vec::new());
             self.decoder.read_image_to_buffer(&mut values).map_err(wrong)?;
@@ -183,7 +195,8 @@ fn unpacked(values: DecodingResult, bits: u16, row: usize, size: usize) -> Decod
             let mask = (1u16 << bits) as u8 - 1;
             let (each, rows) = (8 / bits, bytes.chunks_exact((row * bits).div_ceil(8)));
             DecodingResult::U8(
-                rows.flat_map(|bytes| (0..row).map(move |x| bytes[x / each] >> (8 - bits * (x % each + 1)) & mask)).collect(),
+                rows.flat_map(|bytes| (0..row).map(move |x| bytes[x / each] >> (8 - bits * (x % each + 1)) & mask))
+                    .collect(),
             )
         }
         other => other,
@@ -243,11 +256,14 @@ impl Numbers for Pages {
         let outer: Vec<usize> = over.iter().copied().chain(rest).collect();
         let stride = |axis: usize| sizes[self.inner..axis].iter().product::<usize>();
         let place = |mut index: usize| {
-            outer.iter().map(|&axis| {
-                let at = index % sizes[axis];
-                index /= sizes[axis];
-                at * stride(axis)
-            }).sum::<usize>()
+            outer
+                .iter()
+                .map(|&axis| {
+                    let at = index % sizes[axis];
+                    index /= sizes[axis];
+                    at * stride(axis)
+                })
+                .sum::<usize>()
         };
         self.pages = (0..self.pages.len()).map(|i| self.pages.get(place(i)).copied()).collect::<Option<_>>()?;
         Some((0..self.inner).chain(outer).collect())
