@@ -188,7 +188,8 @@ impl fmt::Display for ImageSummary {
             let unit = axis.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
             let even = if axis.even { "" } else { ", not evenly" };
             write!(f, "  {}{role}: {} points", axis.name, axis.points)?;
-            write!(f, " from {} to {}{unit}{even}", Short(axis.first), Short(axis.last))?;
+            // In full: two dates may agree in their first six digits.
+            write!(f, " from {} to {}{unit}{even}", axis.first, axis.last)?;
             match &axis.direction {
                 Some(direction) => writeln!(f, ", along ({})", list(direction)),
                 None => writeln!(f),

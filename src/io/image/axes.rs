@@ -397,7 +397,7 @@ impl Image {
             return Ok(self);
         }
         let determinant = nalgebra::Matrix4::from_fn(|row, column| directions[column][row]).determinant();
-        if !(determinant.abs() > 1e-9) {
+        if determinant.is_nan() || determinant.abs() <= 1e-9 {
             return Err("the directions of its axes lie in one plane; placement: stored does without them".into());
         }
         self.frame = Some(Frame { directions, origin });

@@ -56,7 +56,7 @@ impl Variable {
 
     /// The first number of an attribute.
     pub fn number(&self, name: &str) -> Option<f64> {
-        self.numbers(name).filter(|numbers| numbers.len() > 0).map(|numbers| numbers.get(0))
+        self.numbers(name).filter(|numbers| !numbers.is_empty()).map(|numbers| numbers.get(0))
     }
 }
 

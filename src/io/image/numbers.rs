@@ -275,7 +275,7 @@ impl Numbers for Picked {
         let (run, all) = (self.run as u64, (self.run * self.channels) as u64);
         // From the beginning of the current run on, in values of the channel; then in values of all.
         let place = |values: u64| {
-            values / run * all + if values % run == 0 { 0 } else { self.channel as u64 * run + values % run }
+            values / run * all + if values.is_multiple_of(run) { 0 } else { self.channel as u64 * run + values % run }
         };
         let (here, there) = (self.at as u64, self.at as u64 + count);
         self.at = (there % run) as usize;

@@ -13,7 +13,7 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
     let there = length.saturating_sub(request.offset);
     let roles = request.axes.clone().unwrap_or_else(|| Role::GRID.to_vec());
     let channels = match roles.contains(&Role::Channel) {
-        true if there % needed == 0 => (there / needed).max(1),
+        true if there.is_multiple_of(needed) => (there / needed).max(1),
         _ => 1,
     };
     if needed.checked_mul(channels).and_then(|all| request.offset.checked_add(all)) != Some(length) {

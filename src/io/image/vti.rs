@@ -46,7 +46,7 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
         axes.insert(0, Axis::new(&array.name, Some(Role::Channel), array.components));
     }
     let time = image.field_data.iter().find_map(|field| match field {
-        Field::Numbers(array) if array.name == "TimeValue" && array.values.len() > 0 => Some(array.values.get(0)),
+        Field::Numbers(array) if array.name == "TimeValue" && !array.values.is_empty() => Some(array.values.get(0)),
         _ => None,
     });
     let mut axis = Axis::new("time", Some(Role::Time), 1);
