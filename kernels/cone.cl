@@ -38,10 +38,10 @@ REAL NAME(dot_)(REAL4 a, REAL4 b) {
 }
 
 /* HIT, OPEN or UNSURE. If HIT, *t is the distance and *t_error bounds its rounding. */
-uint NAME(meets)(float4 position, float4 way, __global const float4 *corners, REAL *t, REAL *t_error) {
+uint NAME(meets)(float4 position, float4 direction, __global const float4 *corners, REAL *t, REAL *t_error) {
     const REAL tiny = (REAL)1e-30f;
     const REAL rounding = HALF_ULPS * HALF_ULP;
-    REAL4 p = CONVERT(position), w = CONVERT(way);
+    REAL4 p = CONVERT(position), w = CONVERT(direction);
     REAL4 v0 = CONVERT(corners[0]), v1 = CONVERT(corners[1]), v2 = CONVERT(corners[2]);
     REAL4 e0 = v0 - p, e1 = v1 - p, d1 = v1 - v0, d2 = v2 - v0, g2 = v2 - v1;
     REAL s_w = NAME(size)(w) * rounding;

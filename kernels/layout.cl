@@ -1,4 +1,4 @@
-/* What host and device share. src/occlusion/opencl/layout.rs has the same structs, and asks `layout` below whether it
+/* What host and device share. src/trace/opencl/layout.rs has the same structs, and asks `layout` below whether it
    is so. Coordinates are those of the mesh times a power of two that makes the scene about 1 wide. In 3D w is 0. */
 
 typedef struct {
@@ -16,16 +16,16 @@ typedef struct {
     float factor;    /* of the reflection */
     uint turned;     /* whether its sign is */
     uint ignored;    /* the simplex that rays don't hit, or NONE */
-    uint fold_first; /* the cones that the simplices around it hide */
-    uint fold_count;
+    uint star_first; /* the cones that the simplices around it hide */
+    uint star_count;
     uint next;       /* the first ray's place in its sequence */
     uint padding[2];
-} Site;
+} Point;
 
 typedef struct {
     float4 normals[4]; /* inward, of length about 1 */
     float4 bounds;     /* on the rounding of their products with a direction */
-} Fold;
+} StarCone;
 
 #define NONE 0xffffffffu
 
@@ -36,14 +36,14 @@ typedef struct {
 
 __kernel void layout(__global uint *sizes) {
     Node node;
-    Site site;
-    Fold fold;
+    Point point;
+    StarCone cone;
     sizes[0] = sizeof(Node);
     sizes[1] = (uint)((uintptr_t)&node.first - (uintptr_t)&node);
-    sizes[2] = sizeof(Site);
-    sizes[3] = (uint)((uintptr_t)&site.keys - (uintptr_t)&site);
-    sizes[4] = (uint)((uintptr_t)&site.factor - (uintptr_t)&site);
-    sizes[5] = (uint)((uintptr_t)&site.next - (uintptr_t)&site);
-    sizes[6] = sizeof(Fold);
-    sizes[7] = (uint)((uintptr_t)&fold.bounds - (uintptr_t)&fold);
+    sizes[2] = sizeof(Point);
+    sizes[3] = (uint)((uintptr_t)&point.keys - (uintptr_t)&point);
+    sizes[4] = (uint)((uintptr_t)&point.factor - (uintptr_t)&point);
+    sizes[5] = (uint)((uintptr_t)&point.next - (uintptr_t)&point);
+    sizes[6] = sizeof(StarCone);
+    sizes[7] = (uint)((uintptr_t)&cone.bounds - (uintptr_t)&cone);
 }

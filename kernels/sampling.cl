@@ -1,4 +1,4 @@
-/* The directions of src/occlusion/sampling.rs, by the same operations in the same order: the same bits. Products must
+/* The directions of src/trace/sampling.rs, by the same operations in the same order: the same bits. Products must
    not be fused into sums, and divisions and roots must be rounded correctly; the host tries both beforehand. */
 
 #pragma OPENCL FP_CONTRACT OFF
@@ -72,38 +72,38 @@ float4 cube_to_ball(float a, float b, float c) {
     return (float4)(xy.x * across, xy.y * across, shell * cosine, 0.0f);
 }
 
-/* Ray number `next` of a site. */
-float4 sampled(Site site, uint next, __global const uint *matrices) {
-    uint index = scramble(next, site.keys.w);
-    float a = unit(scramble(sobol(index, 0, matrices), site.keys.x));
-    float b = unit(scramble(sobol(index, 1, matrices), site.keys.y));
+/* Ray number `next` of a point. */
+float4 sampled(Point point, uint next, __global const uint *matrices) {
+    uint index = scramble(next, point.keys.w);
+    float a = unit(scramble(sobol(index, 0, matrices), point.keys.x));
+    float b = unit(scramble(sobol(index, 1, matrices), point.keys.y));
     float4 local_;
     float square;
 #if D == 4
-    float c = unit(scramble(sobol(index, 2, matrices), site.keys.z));
+    float c = unit(scramble(sobol(index, 2, matrices), point.keys.z));
     local_ = cube_to_ball(a, b, c);
     square = local_.x * local_.x + local_.y * local_.y;
     square = square + local_.z * local_.z;
     local_.w = sqrt(max(1.0f - square, LOWEST_SQUARED_COSINE));
-    float product = site.axis.x * local_.x + site.axis.y * local_.y;
-    product = product + site.axis.z * local_.z;
-    product = product + site.axis.w * local_.w;
+    float product = point.axis.x * local_.x + point.axis.y * local_.y;
+    product = product + point.axis.z * local_.z;
+    product = product + point.axis.w * local_.w;
 #else
     float2 disk = square_to_disk(a, b);
     local_ = (float4)(disk.x, disk.y, 0.0f, 0.0f);
     square = local_.x * local_.x + local_.y * local_.y;
     local_.z = sqrt(max(1.0f - square, LOWEST_SQUARED_COSINE));
-    float product = site.axis.x * local_.x + site.axis.y * local_.y;
-    product = product + site.axis.z * local_.z;
+    float product = point.axis.x * local_.x + point.axis.y * local_.y;
+    product = product + point.axis.z * local_.z;
 #endif
-    float scale = site.factor * product;
-    float4 world = local_ - scale * site.axis;
-    return site.turned ? -world : world;
+    float scale = point.factor * product;
+    float4 world = local_ - scale * point.axis;
+    return point.turned ? -world : world;
 }
 
 /* Directions alone, to see whether this device makes the right ones. */
-__kernel void directions(__global const Site *sites, __global const uint *matrices, uint rays, __global float4 *out) {
+__kernel void directions(__global const Point *points, __global const uint *matrices, uint rays, __global float4 *out) {
     size_t i = get_global_id(0);
-    Site site = sites[i / rays];
-    out[i] = sampled(site, site.next + (uint)(i % rays), matrices);
+    Point point = points[i / rays];
+    out[i] = sampled(point, point.next + (uint)(i % rays), matrices);
 }

@@ -4,7 +4,7 @@
 //! voxels (or of pixels), which ParaView opens. Data flows one way:
 //!
 //! ```text
-//! text -> pipeline -> scene -> mesh -> accel -> occlusion -> render -> io -> files
+//! text -> pipeline -> io, scene -> mesh -> accel -> trace -> occlusion -> render -> io -> files
 //! ```
 //!
 //! ```no_run
@@ -27,4 +27,5 @@ pub mod pipeline;
 pub mod progress;
 pub mod render;
 pub mod scene;
+pub mod trace;
 pub mod volume;

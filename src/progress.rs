@@ -31,3 +31,8 @@ impl Progress for Silent {
     fn advance(&self, _steps: u64) {}
     fn end(&self) {}
 }
+
+/// The work was cancelled by whoever watches its progress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Cancelled;

@@ -2,12 +2,29 @@
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Vector, Vector64};
-use ao4d::mesh::{Incidence, Mesh, MeshBuilder, Orientation, Surface};
-use ao4d::occlusion::{Sampler, Settings, Site, ambient_occlusion, at_vertices};
+use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::occlusion::Estimator;
 use ao4d::progress::Silent;
+use ao4d::trace::cpu::{CpuBackend, estimate_at};
+use ao4d::trace::{NOTHING, RayBackend, Sampler, Sampling, ShadingPoint};
 
-fn settings(samples: u32) -> Settings {
-    Settings { sampler: Sampler::Sobol, samples, seed: 1, max_distance: f32::INFINITY }
+fn sobol(samples: u32) -> Sampling {
+    Sampling::new(samples, 1)
+}
+
+/// The values at all vertices.
+fn at_vertices<const D: usize>(mesh: &Mesh<D>, sampling: Sampling) -> Vec<f32> {
+    let backend = CpuBackend::new(Tracer::new(mesh.clone()));
+    Estimator::Sampled(sampling).estimate(&backend, &ShadingPoint::vertices(mesh), None, &Silent).unwrap().values
+}
+
+/// The value at one point, by both engines.
+fn at<const D: usize>(mesh: &Mesh<D>, point: ShadingPoint<D>, sampling: Sampling) -> f32 {
+    let backend = CpuBackend::new(Tracer::new(mesh.clone()));
+    let slow = estimate_at(backend.tracer(), &point, &sampling, &Silent).unwrap();
+    let fast = Estimator::Sampled(sampling).estimate(&backend, &[point], None, &Silent).unwrap();
+    assert_eq!(fast.values[0].to_bits(), slow.value.to_bits());
+    slow.value
 }
 
 fn mesh<const D: usize>(surfaces: &[Surface<D>]) -> Mesh<D> {
@@ -79,10 +96,8 @@ fn convex_bodies<const D: usize>() {
     for surface in [corner_simplex::<D>(1.0), corner_simplex(3e-5), corner_simplex(7e5), cross_polytope(0.7, tilt)] {
         let mesh = mesh(&[surface]);
         assert!(mesh.objects[0].is_closed());
-        let tracer = Tracer::new(&mesh);
         for sampler in [Sampler::Sobol, Sampler::Random] {
-            let settings = Settings { sampler, ..settings(4096) };
-            let values = at_vertices(&tracer, &settings, &Silent).unwrap();
+            let values = at_vertices(&mesh, Sampling { sampler, ..sobol(4096) });
             assert!(values.iter().all(|&v| v == 1.0), "{values:?}");
         }
     }
@@ -99,7 +114,7 @@ fn closed_around<const D: usize>() {
     // of the outer surface isn't seen as it faces outwards.
     let centre = Vector64::<D>::from_element(0.05);
     let mesh = mesh(&[corner_simplex(0.1), cross_polytope(1.0, centre)]);
-    let values = at_vertices(&Tracer::new(&mesh), &settings(4096), &Silent).unwrap();
+    let values = at_vertices(&mesh, sobol(4096));
     assert!(values[..=D].iter().all(|&v| v == 0.0), "{values:?}");
     assert!(values[D + 1..].iter().all(|&v| v == 1.0), "{values:?}");
 }
@@ -115,20 +130,16 @@ fn right_angled_fold<const D: usize>() {
     // 45 degrees about it on each side: A = sin 45 degrees, in any D.
     let open = join(half_plane::<D>(0, 1.0, false), half_plane::<D>(1, 1.0, true));
     let mesh = mesh(&[open]);
-    let tracer = Tracer::new(&mesh);
     let normal = mesh.normals[0];
     let sign = normal[0].signum();
     assert!((normal[0] - normal[1]).abs() < 1e-6 && normal.iter().skip(2).all(|x| x.abs() < 1e-6), "{normal}");
-    let site = Site::at_vertex(&tracer, &Incidence::new(&mesh), 0);
-    let value = ambient_occlusion(&tracer, &site, &settings(1 << 16), 0);
+    let value = at(&mesh, ShadingPoint::Vertex(0), sobol(1 << 16));
     // Facing into the fold it is sin 45 degrees; facing out of it everything is open.
     let expected = if sign > 0.0 { std::f32::consts::FRAC_1_SQRT_2 } else { 1.0 };
     assert!((value - expected).abs() < 1e-3, "{D}: {value} {expected}");
     let mut inverted = mesh.clone();
     inverted.normals[0] = -normal;
-    let tracer = Tracer::new(&inverted);
-    let site = Site::at_vertex(&tracer, &Incidence::new(&inverted), 0);
-    let value = ambient_occlusion(&tracer, &site, &settings(1 << 16), 0);
+    let value = at(&inverted, ShadingPoint::Vertex(0), sobol(1 << 16));
     let expected = if sign > 0.0 { 1.0 } else { std::f32::consts::FRAC_1_SQRT_2 };
     assert!((value - expected).abs() < 1e-3, "{D}: {value} {expected}");
 }
@@ -158,7 +169,7 @@ fn fold_of_a_body<const D: usize>() {
     assert!(!open.simplices.is_empty() && open.simplices.len() < closed.simplices.len() / 2);
     let (closed, open) = (mesh(&[closed]), mesh(&[open]));
     assert!(closed.objects[0].is_closed() && !open.objects[0].is_closed());
-    let values = [&closed, &open].map(|m| at_vertices(&Tracer::new(m), &settings(4096), &Silent).unwrap());
+    let values = [&closed, &open].map(|m| at_vertices(m, sobol(4096)));
     let mut folds = 0;
     for (v, p) in closed.vertices.iter().enumerate() {
         // On the fold, and not at its ends, where the body has another face.
@@ -195,10 +206,9 @@ fn ball_above<const D: usize>() {
         .fold(f64::INFINITY, f64::min);
     ball.vertices.iter_mut().for_each(|v| *v = *v * r + centre);
     let mesh = mesh(&[ball]);
-    let tracer = Tracer::new(&mesh);
     let up = Vector::<D>::from_fn(|i, _| if i == D - 1 { 1.0 } else { 0.0 });
-    let site = Site::inside_simplex(Vector::zeros(), up, u32::MAX);
-    let value = f64::from(ambient_occlusion(&tracer, &site, &settings(1 << 16), 3));
+    let point = ShadingPoint::Inside { position: Vector::zeros(), normal: up, simplex: NOTHING, number: 3 };
+    let value = f64::from(at(&mesh, point, sobol(1 << 16)));
     let power = D as i32 - 1;
     let (most, least) = ((r / d).powi(power), (r * inradius / d).powi(power));
     assert!(1.0 - value <= most + 5e-4 && 1.0 - value >= least - 5e-4, "{D}: {} in [{least}, {most}]", 1.0 - value);
@@ -247,11 +257,10 @@ fn wall<const D: usize>() {
     wall = join(wall, other);
     // The wall is the hyperplane x_2 = 0; stand beside it at x_2 = 1, looking along x_1.
     let mesh = mesh(&[wall]);
-    let tracer = Tracer::new(&mesh);
     let position = Vector::<D>::from_fn(|i, _| if i == 1 { 1.0 } else { 0.25 });
     let normal = Vector::<D>::from_fn(|i, _| if i == 0 { 1.0 } else { 0.0 });
-    let site = Site::inside_simplex(position, normal, u32::MAX);
-    let value = ambient_occlusion(&tracer, &site, &settings(1 << 16), 9);
+    let point = ShadingPoint::Inside { position, normal, simplex: NOTHING, number: 9 };
+    let value = at(&mesh, point, sobol(1 << 16));
     assert!((value - 0.5).abs() < 1e-3, "{D}: {value}");
 }
 
@@ -265,7 +274,7 @@ fn symmetric<const D: usize>() {
     // Two equal bodies, mirror images of each other: the values are equal up to sampling.
     let apart = Vector64::<D>::from_fn(|i, _| if i == 0 { 0.8 } else { 0.0 });
     let mesh = mesh(&[cross_polytope(0.7, apart), cross_polytope(0.7, -apart)]);
-    let values = at_vertices(&Tracer::new(&mesh), &settings(1 << 14), &Silent).unwrap();
+    let values = at_vertices(&mesh, sobol(1 << 14));
     let half = values.len() / 2;
     assert!(values.iter().any(|&v| v < 0.99) && values.contains(&1.0), "{values:?}");
     for (i, &value) in values[..half].iter().enumerate() {

@@ -1,11 +1,13 @@
 //! Whether OpenCL leaves memory behind; in a process of its own, where nothing else takes any.
 
+use std::sync::Arc;
+
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
-use ao4d::occlusion::opencl::{OpenCl, Point, Scene};
-use ao4d::occlusion::{Sampler, Settings};
 use ao4d::progress::Silent;
+use ao4d::trace::opencl::{OpenCl, OpenClBackend};
+use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 
 /// Bytes of memory that this process has.
 fn resident() -> u64 {
@@ -27,15 +29,14 @@ fn row() -> Mesh<4> {
 #[ignore = "needs an OpenCL device: run tests/all"]
 fn many_runs_leave_nothing_behind() {
     let opencl = OpenCl::open(&[]).unwrap();
-    let mesh = row();
-    let tracer = Tracer::new(&mesh);
-    let points: Vec<Point<4>> = (0..80).map(Point::Vertex).collect();
-    let settings = Settings { sampler: Sampler::Random, samples: 64, seed: 5, max_distance: f32::INFINITY };
-    let scene = Scene::new(&opencl, &tracer).unwrap();
+    let tracer = Arc::new(Tracer::new(row()));
+    let points: Vec<ShadingPoint<4>> = (0..80).map(ShadingPoint::Vertex).collect();
+    let sampling = Sampling::random(64, 5);
+    let device = OpenClBackend::new(&opencl, tracer.clone()).unwrap();
     let trace = |times: usize| {
-        (0..times).for_each(|_| drop(scene.estimate(&points, &settings, None, &Silent).unwrap()));
+        (0..times).for_each(|_| drop(device.open_fractions(&points, &sampling, &Silent).unwrap()));
     };
-    let bring = |times: usize| (0..times).for_each(|_| drop(Scene::new(&opencl, &tracer).unwrap()));
+    let bring = |times: usize| (0..times).for_each(|_| drop(OpenClBackend::new(&opencl, tracer.clone()).unwrap()));
     for (what, run, times, most) in
         [("rays", &trace as &dyn Fn(usize), 1000, 8 << 20), ("scenes", &bring, 50, 24 << 20)]
     {

@@ -2,6 +2,7 @@
 //! simplex leaves between yes and no; and the same on any number of threads.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
@@ -11,6 +12,8 @@ use ao4d::progress::Silent;
 use ao4d::render::visibility::Method;
 use ao4d::render::{Camera, NOTHING, Projection, View, Visibility};
 use ao4d::scene::{ObjectSpec, build_object};
+use ao4d::trace::RayBackend;
+use ao4d::trace::cpu::CpuBackend;
 use serde_json::{Value, json};
 
 mod support;
@@ -40,12 +43,16 @@ fn vector<const D: usize>(numbers: [f64; 4]) -> Vector64<D> {
     Vector64::from_fn(|r, _| numbers[if r == D - 1 { 3 } else { r }])
 }
 
+fn backend<const D: usize>(mesh: &Mesh<D>) -> Arc<dyn RayBackend<D>> {
+    Arc::new(CpuBackend::new(Tracer::new(mesh.clone())))
+}
+
 /// Voxels that the two ways agree on, of those that see something; fails where they don't.
 fn agree<const D: usize>(name: &str, mesh: &Mesh<D>, camera: &Camera<D>, dimensions: [usize; 3]) -> usize {
-    let tracer = Tracer::new(mesh);
+    let backend = backend(mesh);
     let grid = camera.grid(dimensions);
     let [cast, raster] = [Method::RayCast, Method::Rasterize].map(|method| {
-        let visibility = Visibility::new(&tracer, camera, &grid, method);
+        let visibility = Visibility::new(backend.clone(), camera, &grid, method);
         assert_eq!(visibility.method(), method);
         visibility.first_hits(0..dimensions[2], &Silent).unwrap()
     });
@@ -172,11 +179,11 @@ fn voxel_centres_exactly_on_facets() {
 
 fn sliced<const D: usize>() {
     let mesh = mesh(&Random(8).soup::<D>(200, 0.4, true));
-    let tracer = Tracer::new(&mesh);
+    let backend = backend(&mesh);
     let view = View { eye: View::<D>::default().eye * 2.0, ..View::default() };
     let camera = Camera::new(&view).unwrap();
     let grid = camera.grid(if D == 3 { [31, 23, 1] } else { [13, 7, 11] });
-    let visibility = Visibility::new(&tracer, &camera, &grid, Method::Rasterize);
+    let visibility = Visibility::new(backend, &camera, &grid, Method::Rasterize);
     let with = |threads: usize, thick: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let layers = (0..grid.dimensions[2]).step_by(thick);
@@ -235,8 +242,7 @@ fn every_pipelines_pictures() {
 fn the_cheaper_way_is_chosen() {
     let pick = |mesh: &Mesh<4>, distance: f64, dimensions: [usize; 3]| {
         let camera = Camera::new(&View { eye: vector([0.0, 0.0, 0.0, distance]), ..View::default() }).unwrap();
-        let tracer = Tracer::new(mesh);
-        Visibility::new(&tracer, &camera, &camera.grid(dimensions), Method::Auto).method()
+        Visibility::new(backend(mesh), &camera, &camera.grid(dimensions), Method::Auto).method()
     };
     let sphere = mesh(&object::<4>(json!({"hypersphere": {"radius": 1.0, "subdivisions": 6}})));
     assert_eq!(pick(&sphere, 3.0, [64, 64, 64]), Method::Rasterize);

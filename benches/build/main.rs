@@ -11,6 +11,7 @@
 #[allow(dead_code)]
 mod meshes;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use ao4d::accel::{Leaf, Node, Tracer, WideNode};
@@ -38,7 +39,7 @@ fn row<const D: usize>(name: &str) {
     };
     let mut builder = MeshBuilder::new();
     builder.add(name, [0.8; 3], &surface, Orientation::Input).expect("a mesh");
-    let mesh = builder.finish();
+    let mesh = Arc::new(builder.finish());
     let bytes = mesh.vertices.len() * size_of::<Vector<D>>() + mesh.simplices.len() * size_of::<[u32; D]>();
     for threads in list("--threads", "1,2") {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.parse().expect("a number")).build();
@@ -46,7 +47,7 @@ fn row<const D: usize>(name: &str) {
             let mut best = [f64::INFINITY; 4];
             let mut memory = [0; 3];
             for _ in 0..5 {
-                let tracer = Tracer::new(&mesh);
+                let tracer = Tracer::new(Arc::clone(&mesh));
                 let (start, used) = (Instant::now(), cpu_seconds());
                 tracer.prepare();
                 let (tree, tree_cpu) = (start.elapsed().as_secs_f64(), cpu_seconds() - used);

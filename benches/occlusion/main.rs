@@ -22,8 +22,10 @@ use std::time::Instant;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Vector, Vector64};
-use ao4d::mesh::{Incidence, MeshBuilder, Orientation, Surface};
-use ao4d::occlusion::{Level, Sampler, Settings, Stream};
+use ao4d::mesh::{MeshBuilder, Orientation, Surface};
+use ao4d::progress::Silent;
+use ao4d::trace::cpu::{Level, PacketTracer};
+use ao4d::trace::{Sampling, ShadingPoint};
 use rustix::time::{ClockId, clock_gettime};
 
 struct Options {
@@ -118,14 +120,14 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
         normals: None,
     };
     builder.add(name, [0.8; 3], &surface, Orientation::Input).unwrap();
-    let mesh = builder.finish();
     let start = Instant::now();
-    let tracer = Tracer::new(&mesh);
+    let tracer = Tracer::new(builder.finish());
+    let mesh = tracer.mesh();
     tracer.prepare();
     let build = start.elapsed().as_secs_f64();
     let wide = tracer.wide();
     let collapse = start.elapsed().as_secs_f64() - build;
-    let incidence = Incidence::new(&mesh);
+    tracer.incidence();
     let normals = rays::normals::<D>(&plain);
     let offset = rays::offset::<D>(&plain);
     let file = folder.join(format!("{name}.smx"));
@@ -138,9 +140,8 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
         let pattern = folder.join(format!("pattern{D}_{samples}"));
         std::fs::write(&pattern, table.iter().flatten().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>()).unwrap();
         let list = rays::work_list(mesh.vertices.len(), samples, options.max_rays);
-        let settings =
-            Settings { sampler: Sampler::Sobol, samples: samples as u32, seed: 1, max_distance: f32::INFINITY };
-        let mut stream = Stream::<D>::new(options.level);
+        let sampling = Sampling::new(samples as u32, 1);
+        let mut packets = PacketTracer::<D>::new(options.level);
         let mut directions: Vec<Vector<D>> = Vec::new();
         let (mut ours, mut default, mut theirs) = (vec![], vec![], vec![]);
         for _ in 0..options.rounds {
@@ -151,13 +152,13 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
                     rays::directions(&table, v, &normal, &mut directions);
                     let origin = mesh.vertices[v as usize] + normal * offset;
                     blocked +=
-                        u64::from(stream.count_occluded(&tracer, &origin, normal, &directions, f32::INFINITY, None));
+                        u64::from(packets.count_occluded(&tracer, &origin, normal, &directions, f32::INFINITY, None));
                 }
                 1.0 - blocked as f64 / (list.len() * samples) as f64
             }));
             default.push(time(list.len(), samples, || {
-                let values = list.iter().map(|&v| f64::from(stream.at_vertex(&tracer, &incidence, &settings, v)));
-                values.sum::<f64>() / list.len() as f64
+                let mut at = |v| packets.estimate(&tracer, &ShadingPoint::Vertex(v), &sampling, &Silent);
+                list.iter().map(|&v| at(v).map_or(0.0, |found| f64::from(found.value))).sum::<f64>() / list.len() as f64
             }));
             if let Some(program) = program.filter(|_| D == 3) {
                 theirs.extend(time_embree(program, &file, &pattern, samples, options.max_rays));

@@ -12,13 +12,15 @@ mod meshes;
 
 use std::time::Instant;
 
+use std::sync::Arc;
+
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
-use ao4d::mesh::{Incidence, Mesh, MeshBuilder, Orientation, Surface};
-use ao4d::occlusion::opencl::{OpenCl, Point, Scene};
-use ao4d::occlusion::{Sampler, Settings, Site, Stream, estimate_at};
+use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
 use ao4d::progress::Silent;
-use rayon::prelude::*;
+use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
+use ao4d::trace::opencl::{OpenCl, OpenClBackend};
+use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 
 const SAMPLES: u32 = 256;
 
@@ -28,37 +30,31 @@ fn rate<T>(rays: usize, work: impl FnOnce() -> T) -> (T, f64) {
     (result, rays as f64 / start.elapsed().as_secs_f64() / 1e6)
 }
 
-fn measure<const D: usize>(opencl: &OpenCl, name: &str, mesh: &Mesh<D>) {
-    let tracer = Tracer::new(mesh);
+fn measure<const D: usize>(opencl: &OpenCl, name: &str, mesh: Mesh<D>) {
+    let tracer = Arc::new(Tracer::new(mesh));
     tracer.prepare_wide();
-    let incidence = Incidence::new(mesh);
-    let settings = Settings { sampler: Sampler::Sobol, samples: SAMPLES, seed: 1, max_distance: f32::INFINITY };
+    let mesh = tracer.mesh();
+    let sampling = Sampling::new(SAMPLES, 1);
     let step = mesh.vertices.len().div_ceil(2000).max(1);
-    let vertices: Vec<u32> = (0..mesh.vertices.len() as u32).step_by(step).collect();
-    let rays = vertices.len() * SAMPLES as usize;
-    let (scalar, scalar_rate) = rate(rays / 8, || -> Vec<f32> {
-        let some = vertices.par_iter().with_max_len(8).step_by(8);
-        some.map(|&v| estimate_at(&tracer, &Site::at_vertex(&tracer, &incidence, v), &settings, None, v.into()).value)
-            .collect()
-    });
-    let (stream, stream_rate) = rate(rays, || -> Vec<f32> {
-        let at = |stream: &mut Stream<D>, &v: &u32| stream.at_vertex(&tracer, &incidence, &settings, v);
-        vertices.par_iter().map_init(Stream::default, at).collect()
-    });
-    let scene = Scene::new(opencl, &tracer).unwrap_or_else(|error| panic!("{error}"));
-    let points: Vec<Point<D>> = vertices.iter().map(|&v| Point::Vertex(v)).collect();
-    let estimate = || scene.estimate(&points, &settings, None, &Silent).unwrap_or_else(|error| panic!("{error}"));
-    estimate(); // Some drivers compile at the first launch.
-    let before = scene.settled();
-    let (found, device_rate) = rate(rays, estimate);
-    let share = (scene.settled() - before) as f64 / rays as f64;
-    let same = found.iter().zip(&stream).all(|(e, &v)| e.value == v);
-    let same = same && scalar.iter().zip(stream.iter().step_by(8)).all(|(a, b)| a == b);
+    let points: Vec<ShadingPoint<D>> = ShadingPoint::vertices(mesh).into_iter().step_by(step).collect();
+    let some: Vec<ShadingPoint<D>> = points.iter().copied().step_by(8).collect();
+    let rays = points.len() * SAMPLES as usize;
+    let estimate = |backend: &dyn RayBackend<D>, points: &[ShadingPoint<D>]| {
+        backend.open_fractions(points, &sampling, &Silent).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let (scalar, scalar_rate) = rate(rays / 8, || estimate(&ScalarBackend::new(tracer.clone()), &some));
+    let (packets, packet_rate) = rate(rays, || estimate(&CpuBackend::new(tracer.clone()), &points));
+    let device = OpenClBackend::new(opencl, tracer.clone()).unwrap_or_else(|error| panic!("{error}"));
+    estimate(&device, &points); // Some drivers compile at the first launch.
+    let before = device.settled();
+    let (found, device_rate) = rate(rays, || estimate(&device, &points));
+    let share = (device.settled() - before) as f64 / rays as f64;
+    let same = found == packets && scalar.iter().zip(packets.iter().step_by(8)).all(|(a, b)| a == b);
     println!(
-        "| {name} | {} | {scalar_rate:.2} | {stream_rate:.2} | {device_rate:.2} | {:.2} | {:.2} | {:.4} % | {} |",
+        "| {name} | {} | {scalar_rate:.2} | {packet_rate:.2} | {device_rate:.2} | {:.2} | {:.2} | {:.4} % | {} |",
         mesh.simplices.len(),
         device_rate / scalar_rate,
-        device_rate / stream_rate,
+        device_rate / packet_rate,
         share * 100.0,
         if same { "same bits" } else { "DIFFERENT" }
     );
@@ -76,16 +72,16 @@ fn main() {
     };
     let labels: Vec<String> = opencl.devices().map(|info| info.label()).collect();
     println!("{}, rays in millions a second\n", labels.join(" and "));
-    println!("| mesh | simplices | scalar | streams | device | / scalar | / streams | left to the host | values |");
+    println!("| mesh | simplices | scalar | packets | device | / scalar | / packets | left to the host | values |");
     println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- |");
     for size in ["10k", "100k"] {
         for name in ["bumpy3", "cubes3", "soup3"] {
             let name = format!("{name}_{size}");
-            measure(&opencl, &name, &mesh::<3>(&name));
+            measure(&opencl, &name, mesh::<3>(&name));
         }
         for name in ["bumpy4", "cubes4", "soup4"] {
             let name = format!("{name}_{size}");
-            measure(&opencl, &name, &mesh::<4>(&name));
+            measure(&opencl, &name, mesh::<4>(&name));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Ways to choose the points of the (D-1)-ball.
 
-use ao4d::occlusion::{Sampler, Sequence, cube_to_ball, square_to_disk};
+use ao4d::trace::{Sampler, Sequence, cube_to_ball, square_to_disk};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 /// Tells whether a point of the ball is visible.

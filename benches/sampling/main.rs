@@ -18,9 +18,10 @@ use std::time::Instant;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Frame, Vector};
-use ao4d::mesh::Incidence;
-use ao4d::occlusion::{Method, Sampler, Settings, Site};
+use ao4d::occlusion::Estimator;
 use ao4d::progress::Silent;
+use ao4d::trace::cpu::CpuBackend;
+use ao4d::trace::{RayBackend, Sampling, ShadingPoint, Surroundings};
 
 use candidates::CANDIDATES;
 use scenes::Scene;
@@ -63,8 +64,7 @@ impl Sums {
 
 /// Asks every candidate; one row a number of rays.
 fn table<const D: usize>(scene: &Scene<D>) {
-    let tracer = Tracer::new(&scene.mesh);
-    let incidence = Incidence::new(&scene.mesh);
+    let tracer = Tracer::new(scene.mesh.clone());
     let exact = scene.exact(&tracer);
     let mut chosen: Vec<(u32, f64)> = scene.vertices.iter().copied().zip(exact).collect();
     chosen.retain(|(_, a)| (0.001..0.999).contains(a));
@@ -75,13 +75,13 @@ fn table<const D: usize>(scene: &Scene<D>) {
         for (name, candidate) in CANDIDATES {
             let mut sums = Sums::default();
             for &(vertex, truth) in &chosen {
-                let site = Site::at_vertex(&tracer, &incidence, vertex);
-                let frame = site.frame();
+                let surroundings = Surroundings::of(&tracer, &ShadingPoint::Vertex(vertex));
+                let frame = surroundings.frame();
                 for seed in 0..seeds {
                     let mut rays = 0;
                     let mut see = |point: [f32; 3]| {
                         rays += 1;
-                        site.is_visible(&tracer, lifted(&frame, point), f32::INFINITY)
+                        surroundings.is_visible(&tracer, lifted(&frame, point), f32::INFINITY)
                     };
                     let value = candidate(samples, seed * 1_000_003 + u64::from(vertex), D - 1, &mut see);
                     sums.add(value - truth, rays);
@@ -95,7 +95,7 @@ fn table<const D: usize>(scene: &Scene<D>) {
         let mut sums = Sums::default();
         for &(vertex, truth) in &chosen {
             for seed in 0..seeds.min(8) {
-                let value = found::estimate(&scene.mesh, &tracer, &incidence, vertex, samples, seed);
+                let value = found::estimate(&scene.mesh, &tracer, vertex, samples, seed);
                 sums.add(value - truth, samples);
             }
         }
@@ -108,25 +108,25 @@ fn table<const D: usize>(scene: &Scene<D>) {
 fn lifted<const D: usize>(frame: &Frame<D>, point: [f32; 3]) -> Vector<D> {
     let mut local = Vector::<D>::zeros();
     local.as_mut_slice()[..D - 1].copy_from_slice(&point[..D - 1]);
-    ao4d::occlusion::direction(&mut local, frame)
+    ao4d::trace::direction(&mut local, frame)
 }
 
 /// The methods of the program on whole scenes: time a vertex and error.
 fn times<const D: usize>(scene: &Scene<D>) {
-    let tracer = Tracer::new(&scene.mesh);
+    let backend = CpuBackend::new(Tracer::new(scene.mesh.clone()));
+    let (tracer, points) = (backend.tracer(), ShadingPoint::vertices(&scene.mesh));
     let start = Instant::now();
-    let exact = scene.exact(&tracer);
-    let dear = start.elapsed().as_secs_f64() / exact.len() as f64;
-    let mut row = format!("| {} | {} | {:.0} |", scene.name, scene.mesh.simplices.len(), dear * 1e6);
-    let settings = |sampler| Settings { sampler, samples: 256, seed: 1, max_distance: f32::INFINITY };
-    for method in [
-        Method::Sampled(settings(Sampler::Random), None),
-        Method::Sampled(settings(Sampler::Sobol), None),
-        Method::Adaptive(settings(Sampler::Sobol), None),
+    let exact = scene.exact(tracer);
+    let expensive = start.elapsed().as_secs_f64() / exact.len() as f64;
+    let mut row = format!("| {} | {} | {:.0} |", scene.name, scene.mesh.simplices.len(), expensive * 1e6);
+    for estimator in [
+        Estimator::Sampled(Sampling::random(256, 1)),
+        Estimator::Sampled(Sampling::new(256, 1)),
+        Estimator::Adaptive(Sampling::new(256, 1)),
     ] {
         tracer.wide();
         let start = Instant::now();
-        let Ok(found) = method.at_vertices(&tracer, &Silent) else { continue };
+        let Ok(found) = estimator.estimate(&backend, &points, None, &Silent) else { continue };
         let time = start.elapsed().as_secs_f64() / found.values.len() as f64;
         let mut sums = Sums::default();
         for (&vertex, truth) in scene.vertices.iter().zip(&exact) {
@@ -134,7 +134,7 @@ fn times<const D: usize>(scene: &Scene<D>) {
         }
         let known = found.errors.iter().filter(|&&e| e == 0.0).count() as f64 / found.errors.len() as f64;
         row += &format!(" {:.1} | {:.1e} |", time * 1e6, sums.rmse());
-        if matches!(method, Method::Adaptive(..)) {
+        if matches!(estimator, Estimator::Adaptive(_)) {
             row += &format!(" {:.0} % |", 100.0 * known);
         }
     }

@@ -11,16 +11,19 @@
 //! machine disturbs less. Hierarchy and boxes are told apart; both are made once a picture. Below stand rays of ambient
 //! occlusion, 64 at each vertex, in millions a second, and the share that escapes: nearly all, as of NTracer's shadow rays.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation};
-use ao4d::occlusion::{Sampler, Settings, at_vertices};
+use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
 use ao4d::render::visibility::Method;
-use ao4d::render::{Camera, Channel, NOTHING, Picture, Projection, Shading, View};
+use ao4d::render::{Aov, Camera, NOTHING, Projection, Renderer, Shading, View};
 use ao4d::scene::{ObjectSpec, build_object};
+use ao4d::trace::cpu::CpuBackend;
+use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 use rustix::time::{ClockId, clock_gettime};
 
 fn cpu_seconds() -> f64 {
@@ -63,7 +66,7 @@ fn main() {
         "tetrahedra  voxels         threads  way         prepare s   wall s    cpu s   Mvoxels/s (wall, cpu)  seen"
     );
     for n in list("--subdivisions", "4,9,18") {
-        let mesh = sphere(n.parse().expect("a number"));
+        let mesh = Arc::new(sphere(n.parse().expect("a number")));
         for size in list("--dimensions", "128x128x64,128x128x128") {
             let d: Vec<usize> = size.split('x').map(|n| n.parse().expect("a number")).collect();
             let eye = Vector64::from([0.0, 0.0, 0.0, 3.0]);
@@ -82,28 +85,37 @@ fn main() {
                             mesh.simplices.len(), rate / wall, rate / cpu
                         );
                     };
-                    let tracer = Tracer::new(&mesh);
+                    let backend: Arc<dyn RayBackend<4>> = Arc::new(CpuBackend::new(Tracer::new(Arc::clone(&mesh))));
                     for (way, method) in [("ray_cast", Method::RayCast), ("rasterize", Method::Rasterize)] {
                         let (_, prepare, _) = time(|| match method {
-                            Method::RayCast => Tracer::new(&mesh).prepare(),
-                            _ => drop(ao4d::render::Visibility::new(&tracer, &camera, &grid, method)),
+                            Method::RayCast => Tracer::new(Arc::clone(&mesh)).prepare(),
+                            _ => drop(ao4d::render::Visibility::new(Arc::clone(&backend), &camera, &grid, method)),
                         });
-                        let visibility = ao4d::render::Visibility::new(&tracer, &camera, &grid, method);
+                        let visibility = ao4d::render::Visibility::new(Arc::clone(&backend), &camera, &grid, method);
                         let layers = || 0..grid.dimensions[2];
                         let (hits, wall, cpu) =
                             time(|| visibility.first_hits(layers(), &Silent).expect("nobody cancels"));
                         row(way, prepare, wall, cpu, hits.iter().filter(|&&s| s != NOTHING).count());
                     }
-                    let values = vec![0.5; mesh.vertices.len()];
-                    let picture = Picture { tracer: &tracer, camera: camera.clone(), grid, shading: Shading::Smooth(&values), device: None };
-                    let channels = [Channel::Rgba, Channel::AmbientOcclusion, Channel::Opacity];
-                    let (_, wall, cpu) = time(|| picture.slab(0..grid.dimensions[2], &channels, &Silent).expect("a picture"));
-                    row("with shade", 0.0, wall, cpu, 0);
-                    let sobol = Settings { sampler: Sampler::Sobol, samples: 64, seed: 1, max_distance: f32::INFINITY };
+                    let count = mesh.vertices.len();
+                    let estimates = Estimates { values: vec![0.5; count], errors: vec![0.0; count], rays: 0 };
+                    let shading = Shading::Smooth(Arc::new(estimates));
+                    let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), grid.dimensions, shading);
+                    let aovs = [Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity];
+                    for supersample in [1, 2, 3] {
+                        renderer.supersample = supersample;
+                        let slab = |_| Ok::<(), ao4d::occlusion::Error>(());
+                        let (_, wall, cpu) = time(|| renderer.render(&aovs, None, &Silent, slab).expect("a picture"));
+                        row(&format!("shaded, {supersample}"), 0.0, wall, cpu, 0);
+                    }
+                    let sobol = Estimator::Sampled(Sampling::new(64, 1));
+                    let points = ShadingPoint::vertices(&mesh);
                     let start = Instant::now();
-                    tracer.prepare_wide();
+                    backend.tracer().prepare_wide();
                     let prepare = start.elapsed().as_secs_f64();
-                    let (values, wall, cpu) = time(|| at_vertices(&tracer, &sobol, &Silent).expect("nobody cancels"));
+                    let (values, wall, cpu) = time(|| {
+                        sobol.estimate(&*backend, &points, None, &Silent).expect("nobody cancels").values
+                    });
                     let rays = (64 * values.len()) as f64 * 1e-6;
                     println!(
                         "{:>10}  occlusion      {threads:>7}  {:>6.2} Mrays  {prepare:6.4}  {wall:7.4}  {cpu:7.4}   {:9.2} {:9.2}    {:.2} %",

@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::Node;
+use super::node::Node;
 use crate::geometry::{Aabb, Vector};
 
 /// Most bins along an axis; fewer boxes than this have as many bins as there are boxes.

@@ -7,21 +7,11 @@
 use rayon::prelude::*;
 
 use super::build;
+use super::node::Node;
 use crate::geometry::{Aabb, Ray};
 
 /// Deep enough for any traversal.
 const STACK: usize = build::DEPTH + 1;
-
-/// A node: a box, and either a range of boxes (a leaf) or a pair of children.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Node<const D: usize> {
-    /// Holds everything below.
-    pub bounds: Aabb<D>,
-    /// The first item of a leaf in [`Bvh::order`], or the left one of two neighbouring children.
-    pub first: u32,
-    /// The number of items of a leaf; 0 for an inner node.
-    pub count: u32,
-}
 
 /// A hierarchy over boxes.
 #[derive(Clone, Debug, Default, PartialEq)]

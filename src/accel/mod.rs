@@ -3,9 +3,11 @@
 
 mod build;
 mod bvh;
+mod node;
 mod tracer;
 mod wide;
 
-pub use bvh::{Bvh, Node};
+pub use bvh::Bvh;
+pub use node::Node;
 pub use tracer::{Hit, Tracer};
 pub use wide::{Leaf, Scale, TAG_BITS, WIDTH, WideBvh, WideNode};

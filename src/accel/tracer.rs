@@ -4,18 +4,20 @@
 //! simplex in turn; the hierarchy only saves the work.
 
 use std::cmp::Ordering;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use super::{Bvh, WideBvh};
-use crate::geometry::{Aabb, Cone, Ray};
-use crate::mesh::Mesh;
+use crate::geometry::{Aabb, Cone, Crossing, Ray};
+use crate::mesh::{Incidence, Mesh};
 
-/// A mesh with the hierarchy over its simplices of positive measure, which is made when it is first asked for.
+/// A mesh with the hierarchy over its simplices of positive measure, which is made when it is first asked for. It owns
+/// the mesh together with whoever else holds it, so it can be kept in anything.
 #[derive(Clone, Debug)]
-pub struct Tracer<'m, const D: usize> {
-    mesh: &'m Mesh<D>,
+pub struct Tracer<const D: usize> {
+    mesh: Arc<Mesh<D>>,
     bvh: OnceLock<Bvh<D>>,
     wide: OnceLock<WideBvh<D>>,
+    incidence: OnceLock<Incidence>,
 }
 
 /// The simplex that a ray hits first.
@@ -29,15 +31,20 @@ pub struct Hit<const D: usize> {
     pub barycentric: [f64; D],
 }
 
-impl<'m, const D: usize> Tracer<'m, D> {
+impl<const D: usize> Tracer<D> {
     /// Builds nothing yet.
-    pub fn new(mesh: &'m Mesh<D>) -> Self {
-        Self { mesh, bvh: OnceLock::new(), wide: OnceLock::new() }
+    pub fn new(mesh: impl Into<Arc<Mesh<D>>>) -> Self {
+        Self { mesh: mesh.into(), bvh: OnceLock::new(), wide: OnceLock::new(), incidence: OnceLock::new() }
     }
 
     /// The mesh it was made of.
-    pub fn mesh(&self) -> &'m Mesh<D> {
-        self.mesh
+    pub fn mesh(&self) -> &Arc<Mesh<D>> {
+        &self.mesh
+    }
+
+    /// Which simplices each vertex is a corner of; made when first asked for.
+    pub fn incidence(&self) -> &Incidence {
+        self.incidence.get_or_init(|| Incidence::new(&self.mesh))
     }
 
     /// Builds the hierarchy on all threads, unless it is there. Who is going to trace from many threads calls this
@@ -54,7 +61,7 @@ impl<'m, const D: usize> Tracer<'m, D> {
     pub fn prepare_wide(&self) {
         self.prepare();
         if self.wide.get().is_none() {
-            let _ = self.wide.set(WideBvh::new(self.bvh(), self.mesh, true));
+            let _ = self.wide.set(WideBvh::new(self.bvh(), &self.mesh, true));
         }
     }
 
@@ -79,7 +86,7 @@ impl<'m, const D: usize> Tracer<'m, D> {
 
     /// The same hierarchy laid out for SIMD; made when first asked for.
     pub fn wide(&self) -> &WideBvh<D> {
-        self.wide.get_or_init(|| WideBvh::new(self.bvh(), self.mesh, false))
+        self.wide.get_or_init(|| WideBvh::new(self.bvh(), &self.mesh, false))
     }
 
     /// Whether the ray hits this simplex at a distance in `(0, limit]`.
@@ -98,6 +105,35 @@ impl<'m, const D: usize> Tracer<'m, D> {
     /// The simplex that the ray hits first, if any.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray<D>) -> Option<Hit<D>> {
+        self.closest_of(ray, |_, _, _| true)
+    }
+
+    /// The simplex that the ray hits first behind the place where it hits the simplex `after`: strictly behind, by
+    /// exact signs, so that what touches or coincides there is passed over, and layer after layer can be peeled off.
+    /// A simplex that the ray doesn't hit bounds nothing.
+    pub fn next_hit(&self, ray: &Ray<D>, after: u32) -> Option<Hit<D>> {
+        if after as usize >= self.mesh.simplices.len() {
+            return self.closest_hit(ray);
+        }
+        let bound = Cone::of_simplex(&ray.origin, &self.mesh.corners(after));
+        if !bound.contains(&ray.direction) {
+            return self.closest_hit(ray);
+        }
+        let bound = bound.crossing(&ray.direction);
+        self.closest_of(ray, |simplex, cone, crossing| {
+            if simplex == after {
+                false
+            } else if (crossing.t - bound.t).abs() > crossing.error + bound.error {
+                crossing.t > bound.t
+            } else {
+                self.exact_order(ray, simplex, cone, after) == Ordering::Greater
+            }
+        })
+    }
+
+    /// The first hit of those that `counts` accepts.
+    #[inline]
+    fn closest_of(&self, ray: &Ray<D>, counts: impl Fn(u32, &Cone<D>, &Crossing<D>) -> bool) -> Option<Hit<D>> {
         let mut best: Option<(Hit<D>, f64)> = None;
         self.bvh().nearest(ray, f32::INFINITY, |simplex, limit| {
             let cone = Cone::of_simplex(&ray.origin, &self.mesh.corners(simplex));
@@ -105,6 +141,9 @@ impl<'m, const D: usize> Tracer<'m, D> {
                 return limit;
             }
             let crossing = cone.crossing(&ray.direction);
+            if !counts(simplex, &cone, &crossing) {
+                return limit;
+            }
             if let Some((hit, error)) = &best {
                 let order = if (crossing.t - hit.t).abs() > crossing.error + error {
                     crossing.t.total_cmp(&hit.t)

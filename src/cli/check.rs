@@ -1,7 +1,7 @@
 //! `ao4d check`: everything short of running.
 
-use ao4d::occlusion::opencl::OpenCl;
 use ao4d::pipeline::Backend;
+use ao4d::trace::opencl::OpenCl;
 use clap::Args;
 
 use super::console::Console;

@@ -1,6 +1,6 @@
 //! `ao4d devices`: what could compute here.
 
-use ao4d::occlusion::opencl;
+use ao4d::trace::opencl;
 use clap::Args;
 use serde::Serialize;
 

@@ -12,66 +12,18 @@
 //! - a simplex that has p as a corner blocks w if w lies in the cone spanned by its edges from p and -n. Flat and
 //!   convex surroundings block nothing; a concave fold blocks the same, be the surface open or closed;
 //! - a visible point inside a simplex ignores that simplex.
+//!
+//! There is one door: an [`Estimator`] takes shading points and gives [`Estimates`], with rays traced by any
+//! [`crate::trace::RayBackend`].
 
 mod as_published;
-mod estimate;
+mod error;
+mod estimator;
 pub mod exact;
 mod file;
-mod method;
-pub mod opencl;
-mod sampling;
-mod site;
-mod stream;
-mod vertices;
 
-pub use as_published::{AsPublished, Slips, as_published, plain_cramer};
-pub use estimate::{Estimate, Target};
+pub use crate::progress::Cancelled;
+pub use as_published::{AsPublished, Deviations, plain_cramer};
+pub use error::Error;
+pub use estimator::{Estimates, Estimator};
 pub use file::{FileError, Sidecar, decode, encode};
-pub use method::{Method, adaptive};
-pub use sampling::{Sampler, Sequence, cube_to_ball, direction, square_to_disk};
-pub use site::Site;
-pub use stream::{Level, Stream};
-pub use vertices::{Estimates, ambient_occlusion, at_vertices, at_vertices_with, estimate_at, estimate_vertices};
-
-/// How ambient occlusion is computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Where the rays go.
-    pub sampler: Sampler,
-    /// Rays a point; at least 1.
-    pub samples: u32,
-    /// Chooses among equally good sets of rays.
-    pub seed: u64,
-    /// Hits beyond this distance don't count; infinite by default.
-    pub max_distance: f32,
-}
-
-/// The work was cancelled by whoever watches its progress.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("interrupted")]
-pub struct Cancelled;
-
-/// Why there are no values.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Error {
-    /// The work was cancelled.
-    #[error("interrupted")]
-    Cancelled,
-    /// The closed form would have too many pieces.
-    #[error("{place}: exact occlusion is too dear here: {source}")]
-    OverBudget {
-        /// The vertex or voxel.
-        place: String,
-        /// How rich its view is.
-        source: exact::OverBudget,
-    },
-    /// OpenCL fails.
-    #[error(transparent)]
-    OpenCl(#[from] opencl::Error),
-}
-
-impl From<Cancelled> for Error {
-    fn from(_: Cancelled) -> Self {
-        Self::Cancelled
-    }
-}

@@ -14,8 +14,8 @@ use crate::io::vti::{self, ArraySpec, VtiWriter};
 use crate::io::{self, AtomicFile, Error, png, raw::RawWriter, vtu};
 use crate::mesh::Mesh;
 use crate::occlusion::{self, Estimates, Sidecar};
-use crate::render::{Camera, Channel, Picture};
-use crate::volume::{Array, Grid, Kind, Values};
+use crate::render::{Aov as Channel, Camera, Renderer};
+use crate::volume::{Array, Grid, Values};
 
 /// Name and version, as files record it.
 pub(super) const PROGRAM: &str = concat!("ao4d ", env!("CARGO_PKG_VERSION"));
@@ -27,7 +27,6 @@ pub(super) type Finished = (usize, &'static str, PathBuf, u64);
 pub(super) struct PictureFiles {
     out: PathBuf,
     channels: Vec<Channel>,
-    opacity: usize,
     vti: Vec<(usize, PathBuf, VtiWriter<AtomicFile>, Vec<usize>)>,
     raw: Vec<(usize, PathBuf, RawWriter<AtomicFile>, usize)>,
     png: Vec<(usize, PathBuf, AtomicFile)>,
@@ -38,8 +37,7 @@ impl PictureFiles {
     /// Opens those files of a render that have to be made.
     pub fn create(plan: &Plan, render: usize, stale: &Stale, grid: &Grid, mesh_hash: &str) -> Result<Self, Error> {
         let dimension = plan.scenes[plan.renders[render].scene].dimension;
-        // What is seen is counted by opacity, so that is always made.
-        let mut channels = vec![Channel::Opacity];
+        let mut channels = Vec::new();
         let mut place = |channel: Channel| {
             channels.iter().position(|&c| c == channel).unwrap_or_else(|| {
                 channels.push(channel);
@@ -66,7 +64,7 @@ impl PictureFiles {
                 slices.get_or_insert_with(|| (png::Slices::new(grid), place(Channel::Rgba)));
             }
         }
-        Ok(Self { out: plan.out.clone(), channels, opacity: 0, vti, raw, png, slices })
+        Ok(Self { out: plan.out.clone(), channels, vti, raw, png, slices })
     }
 
     /// What the files need of each slab, in this order.
@@ -74,8 +72,8 @@ impl PictureFiles {
         &self.channels
     }
 
-    /// Writes some layers to all files; returns how many of their voxels see something.
-    pub fn add_slab(&mut self, first: usize, slab: &[Array]) -> Result<u64, Error> {
+    /// Writes some layers to all files.
+    pub fn add_slab(&mut self, first: usize, slab: &[Array]) -> Result<(), Error> {
         let named = |file: &Path| AtomicFile::name_in(&self.out.join(file));
         for (_, file, writer, places) in &mut self.vti {
             for (array, &place) in places.iter().enumerate() {
@@ -92,10 +90,7 @@ impl PictureFiles {
         {
             slices.add_slab(first, rgba)?;
         }
-        Ok(match &slab[self.opacity].values {
-            Values::F32(opacity) => opacity.iter().filter(|&&o| o > 0.0).count() as u64,
-            _ => 0,
-        })
+        Ok(())
     }
 
     /// Completes the files and gives them their names.
@@ -121,13 +116,8 @@ impl PictureFiles {
 }
 
 fn array_spec(channel: Channel, dimension: usize) -> ArraySpec {
-    let kind = match channel {
-        Channel::Rgba => Kind::U8,
-        Channel::Object => Kind::U16,
-        _ => Kind::F32,
-    };
     let components = if dimension == 3 { channel.components::<3>() } else { channel.components::<4>() };
-    ArraySpec::new(channel.name(), kind, components)
+    ArraySpec::new(channel.name(), channel.kind(), components)
 }
 
 /// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
@@ -257,9 +247,9 @@ pub(super) fn write_mesh<const D: usize>(
 }
 
 /// Why a picture shows nothing.
-pub(super) fn nothing_seen<const D: usize>(picture: &Picture<D>, id: &str) -> String {
-    let behind = |v: &u32| picture.camera.project(&picture.tracer.mesh().vertices[*v as usize]).1 <= 0.0;
-    let why = if picture.tracer.mesh().simplices.iter().flatten().all(behind) {
+pub(super) fn nothing_seen<const D: usize>(picture: &Renderer<D>, id: &str) -> String {
+    let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
+    let why = if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
         "the scene lies wholly behind the camera; turn the camera, or move it back"
     } else {
         "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"

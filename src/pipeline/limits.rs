@@ -7,7 +7,7 @@ use super::plan::{Plan, RenderPlan, WritePlan};
 use super::spec::{Compression, Encoding};
 use super::work::Stale;
 use crate::io;
-use crate::render::{Channel, Fragment};
+use crate::render::{Aov as Channel, Columns};
 use crate::volume::available_memory;
 
 /// Refuses a run whose files don't fit on the disk, or one layer of whose pictures doesn't fit in memory.
@@ -39,9 +39,9 @@ fn layer_memory(plan: &Plan, stale: &Stale, index: usize) -> u64 {
     if channels.is_empty() {
         return 0;
     }
-    channels.insert(Channel::Opacity); // counts what is seen
     let arrays: u64 = channels.iter().map(|&channel| bytes(plan, render, channel)).sum();
-    let voxel = size_of::<u32>() as u64 + size_of::<Fragment>() as u64 + arrays;
+    let columns = channels.iter().fold(Columns::SIMPLEX, |all, channel| all | channel.columns());
+    let voxel = size_of::<u32>() as u64 + columns.bytes::<4>() as u64 + arrays;
     (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel)
 }
 

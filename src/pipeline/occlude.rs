@@ -6,25 +6,27 @@ use super::plan::{Computation, OcclusionPlan, OcclusionSource, Samples};
 use super::prepare::{Loaded, errors_path, read_values};
 use super::spec;
 use crate::occlusion::exact::Budget;
-use crate::occlusion::{Estimates, Method, Sampler, Settings, Slips, Target};
+use crate::occlusion::{Deviations, Estimates, Estimator};
+use crate::trace::{Sampler, Sampling, Target};
 
-/// The method that a computation stands for.
-pub(super) fn method(computation: &Computation) -> Method {
+/// What computes a computation's values.
+pub(super) fn estimator(computation: &Computation) -> Estimator {
     let (samples, target) = match computation.samples {
         Samples::Fixed(n) => (n, None),
         Samples::Target { error, max_samples } => (max_samples, Some(Target { error: error as f32 })),
-        Samples::Exact => return Method::Exact(Budget { cones: computation.max_cones as usize }),
+        Samples::Exact => return Estimator::Exact(Budget { cones: computation.max_cones as usize }),
     };
-    let settings = Settings {
+    let sampling = Sampling {
         sampler: if computation.method == spec::Method::Random { Sampler::Random } else { Sampler::Sobol },
         samples: u32::try_from(samples).unwrap_or(u32::MAX),
         seed: computation.seed,
         max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
+        target,
     };
     match computation.method {
-        spec::Method::Adaptive => Method::Adaptive(settings, target),
-        spec::Method::AsPublished => Method::AsPublished(settings, Slips::PUBLISHED),
-        _ => Method::Sampled(settings, target),
+        spec::Method::Adaptive => Estimator::Adaptive(sampling),
+        spec::Method::AsPublished => Estimator::AsPublished(sampling, Deviations::PUBLISHED),
+        _ => Estimator::Sampled(sampling),
     }
 }
 

@@ -7,12 +7,13 @@
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::build::{AnyMesh, camera};
 use super::cache::{Cache, Keys};
 use super::files::{self, PictureFiles};
-use super::occlude::{errors_file, kept, method, most_rays};
+use super::occlude::{errors_file, estimator, kept, most_rays};
 use super::plan::{Computation, OcclusionSource, Plan, RenderPlan, StageRef, grouped};
 use super::prepare::{Loaded, Prepared, sidecar_path};
 use super::report::{FileReport, Report};
@@ -23,10 +24,12 @@ use super::{Error, Pipeline, Settings, figure, limits};
 use crate::accel::Tracer;
 use crate::io;
 use crate::mesh::Mesh;
-use crate::occlusion::opencl::{self, OpenCl};
 use crate::occlusion::{self, Cancelled, Estimates};
 use crate::progress::Progress;
-use crate::render::{CameraError, NOTHING, Picture, Shading, Visibility};
+use crate::render::{CameraError, NOTHING, Renderer, Shading, Visibility};
+use crate::trace::cpu::CpuBackend;
+use crate::trace::opencl::{self, OpenCl, OpenClBackend};
+use crate::trace::{self, RayBackend, ShadingPoint};
 
 /// A run that didn't succeed.
 #[derive(Debug, thiserror::Error)]
@@ -76,6 +79,12 @@ impl From<occlusion::Error> for RunError {
     }
 }
 
+impl From<trace::Error> for RunError {
+    fn from(error: trace::Error) -> Self {
+        occlusion::Error::from(error).into()
+    }
+}
+
 /// Runs a pipeline and writes its files. The files are the same bytes on any number of threads.
 ///
 /// # Errors
@@ -110,8 +119,8 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     let mut run = Run { plan, opencl, keys, cache, stale, loaded, progress, report, times: BTreeMap::new() };
     for (scene, mesh) in meshes.into_iter().enumerate() {
         match mesh {
-            Some(AnyMesh::Three(mesh)) => run.scene(scene, &mesh, building)?,
-            Some(AnyMesh::Four(mesh)) => run.scene(scene, &mesh, building)?,
+            Some(AnyMesh::Three(mesh)) => run.scene(scene, mesh, building)?,
+            Some(AnyMesh::Four(mesh)) => run.scene(scene, mesh, building)?,
             None => run.cached_scene(scene)?,
         }
     }
@@ -144,29 +153,33 @@ struct Run<'p> {
 }
 
 /// What has been made of a scene so far.
-struct Scene<'m, const D: usize> {
-    mesh: &'m Mesh<D>,
+struct Scene<'p, const D: usize> {
+    mesh: Arc<Mesh<D>>,
     hash: String,
-    tracer: &'m Tracer<'m, D>,
-    opencl: Option<&'m OpenCl>,
-    device: OnceCell<opencl::Scene<'m, D>>,
-    values: BTreeMap<usize, Estimates>,
+    tracer: Arc<Tracer<D>>,
+    opencl: Option<&'p OpenCl>,
+    backend: OnceCell<Arc<dyn RayBackend<D>>>,
+    values: BTreeMap<usize, Arc<Estimates>>,
 }
 
-impl<'m, const D: usize> Scene<'m, D> {
-    /// What is on the OpenCL device, if there is one; brought there when first asked for.
-    fn device(&self) -> Result<Option<&opencl::Scene<'m, D>>, RunError> {
-        let Some(opencl) = self.opencl else { return Ok(None) };
-        if self.device.get().is_none() {
-            let _ = self.device.set(opencl::Scene::new(opencl, self.tracer)?);
+impl<const D: usize> Scene<'_, D> {
+    /// What traces rays. An OpenCL device gets the scene when it is first asked for.
+    fn backend(&self) -> Result<&Arc<dyn RayBackend<D>>, RunError> {
+        if self.backend.get().is_none() {
+            let tracer = Arc::clone(&self.tracer);
+            let _ = self.backend.set(match self.opencl {
+                Some(opencl) => Arc::new(OpenClBackend::new(opencl, tracer)?),
+                None => Arc::new(CpuBackend::new(tracer)),
+            });
         }
-        Ok(self.device.get())
+        let cpu = || Arc::new(CpuBackend::new(Arc::clone(&self.tracer))) as Arc<dyn RayBackend<D>>;
+        Ok(self.backend.get_or_init(cpu))
     }
 }
 
 impl Run<'_> {
     /// Runs the stages that work on one scene, in order.
-    fn scene<const D: usize>(&mut self, index: usize, mesh: &Mesh<D>, building: Duration) -> Result<(), RunError> {
+    fn scene<const D: usize>(&mut self, index: usize, mesh: Mesh<D>, building: Duration) -> Result<(), RunError> {
         let id = &self.plan.scenes[index].id;
         let detail = format!(
             "{} vertices, {} simplices",
@@ -183,9 +196,10 @@ impl Run<'_> {
                 mesh.simplices.len()
             ));
         }
-        let tracer = Tracer::new(mesh);
-        let (hash, device, values) = (mesh.content_hash(), OnceCell::new(), BTreeMap::new());
-        let mut scene = Scene { mesh, hash, tracer: &tracer, opencl: self.opencl, device, values };
+        let mesh = Arc::new(mesh);
+        let tracer = Arc::new(Tracer::new(Arc::clone(&mesh)));
+        let (hash, backend, values) = (mesh.content_hash(), OnceCell::new(), BTreeMap::new());
+        let mut scene = Scene { mesh, hash, tracer, opencl: self.opencl, backend, values };
         let plan = self.plan;
         for &stage in &plan.order {
             let start = Instant::now();
@@ -284,14 +298,12 @@ impl Run<'_> {
                     Some(found) => found,
                     None => {
                         let start = Instant::now();
-                        let wanted = self.wanted(index, computation, scene)?;
-                        let asked = wanted.as_ref().map_or(count, |w| w.iter().filter(|&&w| w).count());
+                        let mask = self.mask(index, computation, scene)?;
+                        let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
                         self.progress.begin(&format!("occlusion {}", occlusion.id), asked as u64);
-                        let (method, wanted) = (method(computation), wanted.as_deref());
-                        let found = match scene.device()? {
-                            Some(device) => method.at_wanted_on(device, wanted, self.progress),
-                            None => method.at_wanted(scene.tracer, wanted, self.progress),
-                        };
+                        let points = ShadingPoint::vertices(&scene.mesh);
+                        let backend = &**scene.backend()?;
+                        let found = estimator(computation).estimate(backend, &points, mask.as_deref(), self.progress);
                         self.progress.end();
                         let found = found?;
                         self.times.entry(StageRef::Occlusion(index)).or_default().1 = rate(&found, start.elapsed());
@@ -300,13 +312,13 @@ impl Run<'_> {
                 }
             }
         };
-        scene.values.insert(index, values);
+        scene.values.insert(index, Arc::new(values));
         Ok(())
     }
 
     /// The vertices of the simplices that some voxel shows, of the pictures that have to be made; none if all values are
     /// wanted for some file, or if looking costs more than it may save.
-    fn wanted<const D: usize>(
+    fn mask<const D: usize>(
         &self,
         index: usize,
         computation: &Computation,
@@ -323,12 +335,11 @@ impl Run<'_> {
             values && self.stale.render(plan, *i)
         });
         let mut left = most_rays(computation).saturating_mul(scene.mesh.vertices.len() as u64) / 4;
-        let mut wanted = vec![false; scene.mesh.vertices.len()];
+        let mut mask = vec![false; scene.mesh.vertices.len()];
         for (_, render) in renders {
             let camera = camera::<D>(&render.camera)?;
             let grid = camera.grid(render.dimensions);
-            let visibility = Visibility::new(scene.tracer, &camera, &grid, render.visibility);
-            let visibility = visibility.on(scene.device()?);
+            let visibility = Visibility::new(Arc::clone(scene.backend()?), &camera, &grid, render.visibility);
             left = left.saturating_sub(visibility.cost());
             if left == 0 {
                 return Ok(None);
@@ -340,14 +351,14 @@ impl Run<'_> {
                 let mut last = NOTHING;
                 for simplex in visibility.first_hits(layers, self.progress)? {
                     if simplex != NOTHING && simplex != last {
-                        scene.mesh.simplices[simplex as usize].iter().for_each(|&v| wanted[v as usize] = true);
+                        scene.mesh.simplices[simplex as usize].iter().for_each(|&v| mask[v as usize] = true);
                         last = simplex;
                     }
                 }
             }
             self.progress.end();
         }
-        Ok(Some(wanted))
+        Ok(Some(mask))
     }
 
     /// Makes a picture, if some file of it isn't there yet, and its files with it.
@@ -361,24 +372,19 @@ impl Run<'_> {
             self.values(o, scene)?;
         }
         let camera = camera::<D>(&render.camera)?;
-        let grid = camera.grid(render.dimensions);
-        let device = scene.device()?;
         let shading = shading(plan, render, &scene.values);
-        let picture = Picture { tracer: scene.tracer, grid, camera, shading, device };
+        let mut picture = Renderer::new(Arc::clone(scene.backend()?), camera, render.dimensions, shading);
+        picture.visibility = render.visibility;
         let start = Instant::now();
-        let visibility = picture.visibility(render.visibility);
-        let mut files = PictureFiles::create(plan, index, &self.stale, &grid, &scene.hash)?;
+        let mut files = PictureFiles::create(plan, index, &self.stale, &picture.grid, &scene.hash)?;
         let channels = files.channels().to_vec();
-        let thick = picture.layers_within(SLAB_BYTES, &channels);
-        let depth = grid.dimensions[2];
         // Two passes over the voxels: what is seen, and its shade.
         self.progress.begin(&format!("render {}", render.id), 2 * render.voxels());
         let mut seen = 0;
-        for first in (0..depth).step_by(thick) {
-            let layers = first..depth.min(first + thick);
-            let slab = picture.slab_of(&visibility, layers, &channels, self.progress)?;
-            seen += files.add_slab(first, &slab)?;
-        }
+        picture.render(&channels, None, self.progress, |slab| -> Result<(), RunError> {
+            seen += slab.seen;
+            Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
+        })?;
         self.progress.end();
         let rendering = start.elapsed();
         for (write, kind, file, bytes) in files.finish()? {
@@ -413,8 +419,8 @@ impl Run<'_> {
             self.values(o, scene)?;
         }
         let camera = camera::<D>(&render.camera)?;
-        let values = render.occlusion.map(|o| &scene.values[&o]);
-        let (bytes, left_out) = files::write_mesh(&plan.out.join(file), scene.mesh, &camera, values)?;
+        let values = render.occlusion.map(|o| &*scene.values[&o]);
+        let (bytes, left_out) = files::write_mesh(&plan.out.join(file), &scene.mesh, &camera, values)?;
         if left_out > 0 {
             self.report.notes.push(format!(
                 "{}: {left_out} of {} simplices are not wholly before the eye and are left out",
@@ -446,11 +452,11 @@ fn rate(found: &Estimates, time: Duration) -> String {
 /// The working set of a slab: so little that memory is used again for the next, not asked for anew.
 const SLAB_BYTES: usize = 16 << 20;
 
-fn shading<'v>(plan: &Plan, render: &RenderPlan, values: &'v BTreeMap<usize, Estimates>) -> Shading<'v> {
+fn shading(plan: &Plan, render: &RenderPlan, values: &BTreeMap<usize, Arc<Estimates>>) -> Shading {
     let Some(o) = render.occlusion else { return Shading::None };
     match (render.shading, &plan.occlusions[o].source) {
-        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(method(computation)),
-        (spec::Shading::Flat, _) => Shading::Flat(&values[&o].values),
-        _ => Shading::Smooth(&values[&o].values),
+        (spec::Shading::Voxel, OcclusionSource::Compute(computation)) => Shading::Voxel(estimator(computation)),
+        (spec::Shading::Flat, _) => Shading::Flat(Arc::clone(&values[&o])),
+        _ => Shading::Smooth(Arc::clone(&values[&o])),
     }
 }

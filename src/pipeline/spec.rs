@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::one_or_many::OneOrMany;
-pub use crate::render::Channel;
+pub use crate::render::Aov as Channel;
 pub use crate::render::visibility::Method as Visibility;
 pub use crate::scene::ObjectSpec;
 

@@ -1,9 +1,11 @@
-//! Rays from inside closed bodies: none may get out, by the engine of streams, at any level of instructions, or ray by ray.
+//! Rays from inside closed bodies: none may get out, by the packet tracer, at any level of instructions, or ray by ray.
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Ray, Vector, Vector64, narrow};
-use ao4d::mesh::{Incidence, Mesh, Surface};
-use ao4d::occlusion::{Level, Sampler, Settings, Stream};
+use ao4d::mesh::{Mesh, Surface};
+use ao4d::progress::Silent;
+use ao4d::trace::cpu::{Level, PacketTracer};
+use ao4d::trace::{Sampler, Sampling, ShadingPoint};
 use rand::{RngExt, rngs::ChaCha8Rng};
 
 use crate::bodies::{Body, distorted, mesh, nut, plain, random, sphere, vector};
@@ -62,21 +64,23 @@ fn bounds_a_solid<const D: usize>(mesh: &Mesh<D>) -> bool {
     !around.is_empty() && around.values().all(|n| n % 2 == 0)
 }
 
-/// Counts the rays that get out of the body: by streams, and a sixteenth of them ray by ray.
+/// Counts the rays that get out of the body: by packets, and a sixteenth of them ray by ray.
 fn leaks<const D: usize>(body: &Body<D>, rays: usize) -> [usize; 2] {
     let mesh = mesh(&[&body.surface]);
     assert!(bounds_a_solid(&mesh), "{}", body.name);
-    let tracer = Tracer::new(&mesh);
+    let tracer = Tracer::new(mesh);
+    let mesh = tracer.mesh();
     let mut random = random(1);
     let per_point = rays.div_ceil(body.inside.len()).next_multiple_of(8);
     let mut found = [0; 2];
     for origin in &body.inside {
         let directions: Vec<Vector<D>> =
-            (0..per_point).map(|kind| direction(&mesh, origin, &mut random, kind)).collect();
+            (0..per_point).map(|kind| direction(mesh, origin, &mut random, kind)).collect();
         for level in Level::available() {
             // The other levels on a part of them.
             let part = if level == Level::best() { &directions[..] } else { &directions[..per_point / 8] };
-            let hit = Stream::new(level).count_occluded(&tracer, origin, Vector::zeros(), part, f32::INFINITY, None);
+            let hit =
+                PacketTracer::new(level).count_occluded(&tracer, origin, Vector::zeros(), part, f32::INFINITY, None);
             found[0] += part.len() - hit as usize;
         }
         // Eight of every 128, so that all kinds are among them.
@@ -159,13 +163,14 @@ fn darkness<const D: usize>(samples: u32) {
     let mut bright = 0;
     let mut points = 0;
     let mut check = |name: &str, mesh: &Mesh<D>, first: usize| {
-        let (tracer, incidence) = (Tracer::new(mesh), Incidence::new(mesh));
+        let tracer = Tracer::new(mesh.clone());
         for (sampler, max_distance) in [(Sampler::Sobol, f32::INFINITY), (Sampler::Random, 1e30)] {
-            let settings = Settings { sampler, samples, seed: 3, max_distance };
+            let sampling = Sampling { sampler, max_distance, ..Sampling::new(samples, 3) };
             for level in Level::available() {
-                let mut stream = Stream::new(level);
+                let mut packets = PacketTracer::new(level);
                 let values: Vec<f32> = (first..mesh.vertices.len())
-                    .map(|v| stream.at_vertex(&tracer, &incidence, &settings, v as u32))
+                    .map(|v| ShadingPoint::Vertex(v as u32))
+                    .map(|point| packets.estimate(&tracer, &point, &sampling, &Silent).unwrap().value)
                     .collect();
                 let wrong = values.iter().filter(|&&v| v != 0.0).count();
                 points += values.len();
@@ -203,7 +208,8 @@ fn closed_surfaces_are_dark_inside() {
 /// Rays aimed exactly at a vertex, an edge or a facet of a lattice hit the first of the simplices that meet there.
 fn ties<const D: usize>() {
     let mesh = mesh(&[&crate::bodies::cuboid::<D>(1.0, 4)]);
-    let tracer = Tracer::new(&mesh);
+    let tracer = Tracer::new(mesh);
+    let mesh = tracer.mesh();
     let mut random = random(2);
     let (mut wrong, count) = (0, many(100_000));
     for kind in 0..count {

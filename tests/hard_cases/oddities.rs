@@ -3,7 +3,7 @@
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Cone, Ray, Vector, Vector64, narrow, widen};
 use ao4d::mesh::Surface;
-use ao4d::occlusion::{Level, Stream};
+use ao4d::trace::cpu::{Level, PacketTracer};
 use rand::{RngExt, rngs::ChaCha8Rng};
 
 use crate::bodies::{cuboid, mesh, random, round_to, sphere, vector};
@@ -69,7 +69,7 @@ fn doubled_surfaces<const D: usize>() {
     ];
     for (name, surface) in scenes {
         let mesh = mesh(&[&surface]);
-        let tracer = Tracer::new(&mesh);
+        let tracer = Tracer::new(mesh.clone());
         let (mut wrong, count) = ([0; 2], many(4_000));
         for k in 0..count {
             let from = round_to(&(vector::<D>(&mut random) * [0.5, 2.0][k % 2]), 1.0 / 64.0);
@@ -85,7 +85,7 @@ fn doubled_surfaces<const D: usize>() {
             let expected = first(&mesh, &ray);
             wrong[0] += usize::from(tracer.closest_hit(&ray).map(|hit| hit.simplex) != expected);
             let unit = ray.direction / (2.0 * ray.direction.amax());
-            let occluded = Stream::new(Level::best()).count_occluded(
+            let occluded = PacketTracer::new(Level::best()).count_occluded(
                 &tracer,
                 &ray.origin,
                 Vector::zeros(),

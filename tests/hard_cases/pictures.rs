@@ -1,9 +1,12 @@
 //! Voxel centres exactly on vertices, edges and facets.
 
+use std::sync::Arc;
+
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
 use ao4d::progress::Silent;
-use ao4d::render::{Camera, Channel, Picture, Projection, Shading, View};
+use ao4d::render::{Aov, Camera, Projection, Renderer, Shading, View};
+use ao4d::trace::cpu::CpuBackend;
 use ao4d::volume::Values;
 
 use crate::bodies::{cuboid, map, mesh};
@@ -17,7 +20,7 @@ fn voxels_on_facets<const D: usize>(half: bool, perspective: bool) -> usize {
     let size = spacing * f64::from(pieces) / 2.0;
     let back = |p: &Vector64<D>| Vector64::from_fn(|i, _| if i == D - 1 { p[i] - size } else { p[i] });
     let mesh = mesh(&[&map(&cuboid::<D>(size, pieces), back)]);
-    let tracer = Tracer::new(&mesh);
+    let backend = Arc::new(CpuBackend::new(Tracer::new(mesh)));
     let height = spacing * count as f64;
     let (distance, projection) = if perspective {
         (height / 2.0, Projection::Perspective { field_of_view: 90.0 })
@@ -26,9 +29,10 @@ fn voxels_on_facets<const D: usize>(half: bool, perspective: bool) -> usize {
     };
     let eye = View::<D>::default().eye * distance;
     let camera = Camera::new(&View { eye, projection, ..View::default() }).unwrap();
-    let grid = camera.grid([count, count, if D == 4 { count } else { 1 }]);
-    let picture = Picture { tracer: &tracer, camera, grid, shading: Shading::None, device: None };
-    let arrays = picture.slab(0..grid.dimensions[2], &[Channel::Opacity, Channel::Depth], &Silent).unwrap();
+    let dimensions = [count, count, if D == 4 { count } else { 1 }];
+    let renderer = Renderer::new(backend, camera, dimensions, Shading::None);
+    let grid = renderer.grid;
+    let arrays = renderer.volume(&[Aov::Opacity, Aov::Depth], &Silent).unwrap().arrays;
     let (Values::F32(opacity), Values::F32(depth)) = (&arrays[0].values, &arrays[1].values) else { panic!("types") };
     let mut wrong = 0;
     for (n, (&opacity, &depth)) in opacity.iter().zip(depth).enumerate() {

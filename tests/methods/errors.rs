@@ -1,16 +1,19 @@
 //! Estimated errors against real ones, targets, and what the samplers are worth.
 
+use std::sync::Arc;
+
 use ao4d::accel::Tracer;
-use ao4d::mesh::Incidence;
-use ao4d::occlusion::{Estimate, Method, Sampler, Settings, Site, Stream, Target, estimate_at};
+use ao4d::occlusion::Estimator;
 use ao4d::progress::Silent;
+use ao4d::trace::cpu::{CpuBackend, PacketTracer, estimate_at};
+use ao4d::trace::{Estimate, Sampler, Sampling, ShadingPoint, Target};
 
 use crate::scenes::{self, Scene};
 
 in_3d_and_4d! { estimates_are_calibrated targets_are_met half_the_error_of_random_rays fast_is_slow }
 
-fn settings(sampler: Sampler, samples: u32, seed: u64) -> Settings {
-    Settings { sampler, samples, seed, max_distance: f32::INFINITY }
+fn sampling(sampler: Sampler, samples: u32, seed: u64) -> Sampling {
+    Sampling { sampler, ..Sampling::new(samples, seed) }
 }
 
 /// Estimates at the chosen vertices of a scene, under several seeds, each with its real error.
@@ -19,14 +22,14 @@ fn against_exact<const D: usize>(
     tracer: &Tracer<D>,
     exact: &[f64],
     seeds: u64,
-    mut estimate: impl FnMut(&mut Stream<D>, &Incidence, u64, u32) -> Estimate,
+    sampling: impl Fn(u64) -> Sampling,
 ) -> Vec<(Estimate, f64)> {
-    let incidence = Incidence::new(tracer.mesh());
-    let mut stream = Stream::default();
+    let mut packets = PacketTracer::default();
     let mut found = Vec::new();
     for seed in 0..seeds {
         for (&vertex, exact) in scene.vertices.iter().zip(exact) {
-            let estimate = estimate(&mut stream, &incidence, seed, vertex);
+            let point = ShadingPoint::Vertex(vertex);
+            let estimate = packets.estimate(tracer, &point, &sampling(seed), &Silent).unwrap();
             found.push((estimate, f64::from(estimate.value) - exact));
         }
     }
@@ -40,14 +43,11 @@ fn rms(errors: impl Iterator<Item = f64> + Clone) -> f64 {
 /// Of the values whose rays differ at least 90 % lie within two standard errors, on every scene.
 fn estimates_are_calibrated<const D: usize>() {
     for scene in scenes::all::<D>(24) {
-        let tracer = Tracer::new(&scene.mesh);
+        let tracer = Arc::new(Tracer::new(scene.mesh.clone()));
         let exact = scene.exact(&tracer);
         for sampler in [Sampler::Sobol, Sampler::Random] {
             for samples in [64, 256, 1000, 1024] {
-                let found = against_exact(&scene, &tracer, &exact, 6, |stream, incidence, seed, vertex| {
-                    let settings = settings(sampler, samples, seed);
-                    stream.estimate_at_vertex(&tracer, incidence, &settings, None, vertex)
-                });
+                let found = against_exact(&scene, &tracer, &exact, 6, |seed| sampling(sampler, samples, seed));
                 assert!(found.iter().all(|(e, _)| e.error >= 1.5 / samples as f32 && e.rays == samples));
                 let differ: Vec<_> = found.iter().filter(|(e, _)| e.value > 0.0 && e.value < 1.0).collect();
                 assert!(differ.len() >= 20, "{}: only {} values whose rays differ", scene.name, differ.len());
@@ -71,13 +71,13 @@ fn estimates_are_calibrated<const D: usize>() {
 /// Every vertex gets as many rays as it needs and no more than are allowed, and the errors are as small as was asked.
 fn targets_are_met<const D: usize>() {
     for scene in scenes::all::<D>(24) {
-        let tracer = Tracer::new(&scene.mesh);
+        let tracer = Arc::new(Tracer::new(scene.mesh.clone()));
         let exact = scene.exact(&tracer);
         for error in [0.02, 0.005] {
             let most = 1 << 15;
-            let found = against_exact(&scene, &tracer, &exact, 3, |stream, incidence, seed, vertex| {
-                let settings = settings(Sampler::Sobol, most, seed);
-                stream.estimate_at_vertex(&tracer, incidence, &settings, Some(Target { error }), vertex)
+            let found = against_exact(&scene, &tracer, &exact, 3, |seed| Sampling {
+                target: Some(Target { error }),
+                ..sampling(Sampler::Sobol, most, seed)
             });
             let real = rms(found.iter().map(|f| f.1));
             let rays = found.iter().map(|(e, _)| f64::from(e.rays)).sum::<f64>() / found.len() as f64;
@@ -94,12 +94,11 @@ fn targets_are_met<const D: usize>() {
         // A target out of reach takes all that is allowed.
         let vertex = scene.vertices[exact.iter().position(|&a| a < 0.95 && a > 0.05).unwrap()];
         let out_of_reach = Some(Target { error: 1e-6 });
-        let settings = settings(Sampler::Sobol, 500, 1);
-        let incidence = Incidence::new(tracer.mesh());
-        let mut stream = Stream::default();
-        let estimate = stream.estimate_at_vertex(&tracer, &incidence, &settings, out_of_reach, vertex);
+        let all = sampling(Sampler::Sobol, 500, 1);
+        let at = |sampling| estimate_at(&tracer, &ShadingPoint::Vertex(vertex), &sampling, &Silent).unwrap();
+        let estimate = at(Sampling { target: out_of_reach, ..all });
         assert_eq!(estimate.rays, 500);
-        assert_eq!(estimate.value, stream.at_vertex(&tracer, &incidence, &settings, vertex));
+        assert_eq!(estimate, at(all));
     }
 }
 
@@ -107,16 +106,17 @@ fn targets_are_met<const D: usize>() {
 /// pipelines.
 fn half_the_error_of_random_rays<const D: usize>() {
     for scene in scenes::all::<D>(40) {
-        let tracer = Tracer::new(&scene.mesh);
+        let tracer = Arc::new(Tracer::new(scene.mesh.clone()));
         let exact = scene.exact(&tracer);
         let error_of = |sampler| {
-            let found = against_exact(&scene, &tracer, &exact, 8, |stream, incidence, seed, vertex| {
-                stream.estimate_at_vertex(&tracer, incidence, &settings(sampler, 256, seed), None, vertex)
-            });
+            let found = against_exact(&scene, &tracer, &exact, 8, |seed| sampling(sampler, 256, seed));
             (rms(found.iter().map(|f| f.1)), found.iter().map(|f| f.1).sum::<f64>() / found.len() as f64)
         };
         let (random, sobol) = (error_of(Sampler::Random).0, error_of(Sampler::Sobol).0);
-        let adaptive = Method::Adaptive(settings(Sampler::Sobol, 256, 1), None).at_vertices(&tracer, &Silent).unwrap();
+        let backend = CpuBackend::new(tracer.clone());
+        let points = ShadingPoint::vertices(tracer.mesh());
+        let adaptive = Estimator::Adaptive(sampling(Sampler::Sobol, 256, 1));
+        let adaptive = adaptive.estimate(&backend, &points, None, &Silent).unwrap();
         let found = scene.vertices.iter().map(|&v| f64::from(adaptive.values[v as usize])).zip(&exact);
         let adaptive = rms(found.map(|(value, exact)| value - exact));
         println!(
@@ -134,18 +134,17 @@ fn half_the_error_of_random_rays<const D: usize>() {
 /// The fast engine says what the slow one says, of values and errors, with targets and without.
 fn fast_is_slow<const D: usize>() {
     for scene in scenes::all::<D>(6) {
-        let tracer = Tracer::new(&scene.mesh);
-        let incidence = Incidence::new(&scene.mesh);
-        let mut stream = Stream::default();
+        let tracer = Arc::new(Tracer::new(scene.mesh.clone()));
+        let mut packets = PacketTracer::default();
         for sampler in [Sampler::Sobol, Sampler::Random] {
             for (samples, target) in
                 [(7, None), (100, None), (256, None), (777, None), (2048, Some(Target { error: 0.015 }))]
             {
                 for &vertex in &scene.vertices {
-                    let settings = settings(sampler, samples, 4);
-                    let fast = stream.estimate_at_vertex(&tracer, &incidence, &settings, target, vertex);
-                    let site = Site::at_vertex(&tracer, &incidence, vertex);
-                    assert_eq!(fast, estimate_at(&tracer, &site, &settings, target, u64::from(vertex)));
+                    let sampling = Sampling { target, ..sampling(sampler, samples, 4) };
+                    let point = ShadingPoint::Vertex(vertex);
+                    let fast = packets.estimate(&tracer, &point, &sampling, &Silent);
+                    assert_eq!(fast, estimate_at(&tracer, &point, &sampling, &Silent));
                 }
             }
         }

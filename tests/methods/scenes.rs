@@ -4,9 +4,10 @@ use std::path::Path;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
-use ao4d::mesh::{Incidence, Mesh, MeshBuilder, Orientation, Surface};
-use ao4d::occlusion::exact::{Budget, at_vertex};
+use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::occlusion::exact::{Budget, Hemisphere};
 use ao4d::pipeline::{AnyMesh, Pipeline};
+use ao4d::trace::ShadingPoint;
 
 /// A mesh, and which of its vertices are looked at: some 100 at most, evenly spread.
 pub struct Scene<const D: usize> {
@@ -24,8 +25,10 @@ impl<const D: usize> Scene<D> {
 
     /// The exact values at the chosen vertices.
     pub fn exact(&self, tracer: &Tracer<D>) -> Vec<f64> {
-        let incidence = Incidence::new(&self.mesh);
-        let value = |&v: &u32| at_vertex(tracer, &incidence, v, Budget::default()).unwrap();
+        let value = |&v: &u32| {
+            let view = Hemisphere::over(tracer, &ShadingPoint::Vertex(v));
+            view.map_or(1.0, |view| view.visible_fraction(Budget::default()).unwrap().clamp(0.0, 1.0))
+        };
         self.vertices.iter().map(value).collect()
     }
 }

@@ -1,14 +1,17 @@
 //! The same bits as on the processor.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Ray, Vector, Vector64};
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
-use ao4d::occlusion::opencl::{OpenCl, Point, Scene};
-use ao4d::occlusion::{Method, Sampler, Settings, Target};
+use ao4d::occlusion::Estimator;
 use ao4d::pipeline::{Backend, Pipeline, run};
 use ao4d::progress::Silent;
+use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
+use ao4d::trace::opencl::{OpenCl, OpenClBackend};
+use ao4d::trace::{Error, NOTHING, RayBackend, Sampler, Sampling, ShadingPoint, Target};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 /// All files of a folder but the cache.
@@ -131,7 +134,7 @@ fn soup<const D: usize>(
 
 fn soups<const D: usize>(opencl: &OpenCl) {
     let mut random = ChaCha8Rng::seed_from_u64(8);
-    let settings = Settings { sampler: Sampler::Sobol, samples: 130, seed: 5, max_distance: f32::INFINITY };
+    let sobol = Sampling::new(130, 5);
     let cases = [
         (0, 0.5, 0.0, 1.0, 0.0),
         (1, 0.5, 0.0, 1.0, 0.0),
@@ -148,38 +151,58 @@ fn soups<const D: usize>(opencl: &OpenCl) {
     ];
     for (count, size, step, factor, offset) in cases {
         let mesh = soup::<D>(&mut random, count, size, step, factor, offset);
-        let tracer = Tracer::new(&mesh);
-        let scene = Scene::new(opencl, &tracer).unwrap();
+        let tracer = Arc::new(Tracer::new(mesh));
+        let mesh = tracer.mesh();
+        let device = OpenClBackend::new(opencl, tracer.clone()).unwrap();
         let name = format!("{D}D, {count} simplices, step {step}, times {factor:e}, plus {offset:e}");
-        for (settings, target) in [
-            (settings, None),
-            (settings, Some(Target { error: 0.03 })),
-            (Settings { sampler: Sampler::Random, max_distance: 0.5 * factor as f32, ..settings }, None),
+        let mut points = ShadingPoint::vertices(mesh);
+        for simplex in 0..mesh.simplices.len() as u32 {
+            // In double precision, as sums of large coordinates overflow.
+            let sum = mesh.corners(simplex).iter().fold(Vector64::<D>::zeros(), |sum, c| sum + c.map(f64::from));
+            let normal = vector::<D>(&mut random, 1.0).normalize().map(|x| x as f32);
+            let position = (sum / D as f64).map(|x| x as f32);
+            points.push(ShadingPoint::Inside { position, normal, simplex, number: u64::from(simplex) });
+        }
+        for sampling in [
+            sobol,
+            Sampling { target: Some(Target { error: 0.03 }), ..sobol },
+            Sampling { sampler: Sampler::Random, max_distance: 0.5 * factor as f32, ..sobol },
         ] {
-            let method = Method::Sampled(settings, target);
-            let cpu = method.at_vertices(&tracer, &Silent).unwrap();
-            let device = method.at_wanted_on(&scene, None, &Silent).unwrap();
-            assert_eq!(cpu, device, "{name}");
+            let estimate = |backend: &dyn RayBackend<D>| {
+                Estimator::Sampled(sampling).estimate(backend, &points, None, &Silent).unwrap()
+            };
+            let slow = estimate(&ScalarBackend::new(tracer.clone()));
+            assert_eq!(estimate(&CpuBackend::new(tracer.clone())), slow, "{name}");
+            assert_eq!(estimate(&device), slow, "{name}");
         }
         let rays: Vec<Ray<D>> = (0..3000)
             .map(|k| {
                 let origin = vector::<D>(&mut random, 2.0 * factor).map(|x| (x + offset) as f32);
                 let aim = |random: &mut ChaCha8Rng| mesh.vertices[random.random_range(0..mesh.vertices.len())];
-                let way = if k % 2 == 0 && count > 0 {
+                let direction = if k % 2 == 0 && count > 0 {
                     (aim(&mut random) - origin).map(|x| (f64::from(x) / factor) as f32)
                 } else {
                     vector::<D>(&mut random, 1.0).map(|x| x as f32)
                 };
-                Ray::new(origin, way)
+                Ray::new(origin, direction)
             })
             .filter(|ray| ray.direction.amax() > 0.0)
             .collect();
-        let found = scene.first_hits(&rays, &Silent).unwrap();
-        for (ray, simplex) in rays.iter().zip(found) {
-            let expected = tracer.closest_hit(ray).map_or(u32::MAX, |hit| hit.simplex);
-            assert_eq!(simplex, expected, "{name}");
+        // Layer after layer: what is hit first, then what is behind that, and so on.
+        let hits =
+            |backend: &dyn RayBackend<D>, after: Option<&[u32]>| backend.first_hits(&rays, after, &Silent).unwrap();
+        let cpu = CpuBackend::new(tracer.clone());
+        let mut after = hits(&device, None);
+        for (ray, simplex) in rays.iter().zip(&after) {
+            let expected = tracer.closest_hit(ray).map_or(NOTHING, |hit| hit.simplex);
+            assert_eq!(*simplex, expected, "{name}");
         }
-        println!("{name}: {} rays left to the host", scene.settled());
+        for layer in 1..5 {
+            let found = hits(&device, Some(&after));
+            assert_eq!(found, hits(&cpu, Some(&after)), "{name}, layer {layer}");
+            after = found;
+        }
+        println!("{name}: {} rays left to the host", device.settled());
     }
 }
 
@@ -197,26 +220,27 @@ fn directions_are_made_there_and_few_rays_are_left_here() {
     let opencl = OpenCl::open(&[]).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let mesh = soup::<4>(&mut random, 2000, 0.1, 0.0, 1.0, 0.0);
-    let tracer = Tracer::new(&mesh);
-    let scene = Scene::new(&opencl, &tracer).unwrap();
-    assert!(scene.makes_directions());
-    let settings = Settings { sampler: Sampler::Sobol, samples: 64, seed: 5, max_distance: f32::INFINITY };
-    let points: Vec<Point<4>> = (0..8000).map(Point::Vertex).collect();
-    let first = scene.estimate(&points, &settings, None, &Silent).unwrap();
-    assert!(scene.settled() < 8000 * 64 / 100, "{} of {} rays", scene.settled(), 8000 * 64);
+    let tracer = Arc::new(Tracer::new(mesh));
+    let device = OpenClBackend::new(&opencl, tracer.clone()).unwrap();
+    assert!(device.makes_directions());
+    let sampling = Sampling::new(64, 5);
+    let points: Vec<ShadingPoint<4>> = (0..8000).map(ShadingPoint::Vertex).collect();
+    let first = device.open_fractions(&points, &sampling, &Silent).unwrap();
+    assert!(device.settled() < 8000 * 64 / 100, "{} of {} rays", device.settled(), 8000 * 64);
     // Once more, and in another order: the same.
-    assert_eq!(first, scene.estimate(&points, &settings, None, &Silent).unwrap());
-    let back: Vec<Point<4>> = points.iter().rev().copied().collect();
-    let mut backwards = scene.estimate(&back, &settings, None, &Silent).unwrap();
+    assert_eq!(first, device.open_fractions(&points, &sampling, &Silent).unwrap());
+    let back: Vec<ShadingPoint<4>> = points.iter().rev().copied().collect();
+    let mut backwards = device.open_fractions(&back, &sampling, &Silent).unwrap();
     backwards.reverse();
     assert_eq!(first, backwards);
     // And by two devices together, or one opened twice.
     let two = OpenCl::open(&[(0, 0), (0, 0)]).unwrap();
-    let scene = Scene::new(&two, &tracer).unwrap();
-    assert_eq!(first, scene.estimate(&points, &settings, None, &Silent).unwrap());
+    let device = OpenClBackend::new(&two, tracer.clone()).unwrap();
+    assert_eq!(first, device.open_fractions(&points, &sampling, &Silent).unwrap());
+    let mesh = tracer.mesh();
     let ray = |k: usize| Ray::new(mesh.vertices[k], mesh.vertices[(k * 7 + 1) % 8000] - mesh.vertices[k]);
     let rays: Vec<Ray<4>> = (0..4000).map(ray).collect();
-    let found = scene.first_hits(&rays, &Silent).unwrap();
+    let found = device.first_hits(&rays, None, &Silent).unwrap();
     assert!(rays.iter().zip(found).all(|(r, f)| f == tracer.closest_hit(r).map_or(u32::MAX, |hit| hit.simplex)));
 }
 
@@ -237,11 +261,10 @@ impl ao4d::progress::Progress for Stop {
 fn it_can_be_stopped() {
     let opencl = OpenCl::open(&[]).unwrap();
     let mesh = soup::<4>(&mut ChaCha8Rng::seed_from_u64(1), 100, 0.2, 0.0, 1.0, 0.0);
-    let tracer = Tracer::new(&mesh);
-    let scene = Scene::new(&opencl, &tracer).unwrap();
-    let settings = Settings { sampler: Sampler::Sobol, samples: 64, seed: 5, max_distance: f32::INFINITY };
-    let stopped = Method::Sampled(settings, None).at_wanted_on(&scene, None, &Stop);
+    let points = ShadingPoint::vertices(&mesh);
+    let device = OpenClBackend::new(&opencl, Tracer::new(mesh)).unwrap();
+    let stopped = Estimator::Sampled(Sampling::new(64, 5)).estimate(&device, &points, None, &Stop);
     assert_eq!(stopped, Err(ao4d::occlusion::Error::Cancelled));
     let ray = Ray::new(Vector::zeros(), Vector::from_element(0.5));
-    assert_eq!(scene.first_hits(&[ray], &Stop), Err(ao4d::occlusion::Error::Cancelled));
+    assert_eq!(device.first_hits(&[ray], None, &Stop), Err(Error::Cancelled));
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::RealField;
 
-use super::Slips;
+use super::Deviations;
 use crate::geometry::{Ray, Vector, Vector64, widen};
 
 /// A point or vector of either precision.
@@ -10,9 +10,9 @@ type Point<T, const D: usize> = nalgebra::SVector<T, D>;
 
 /// Whether a ray hits a simplex at t > 0 by Cramer's rule in `f32`, and in `f64`: to compare with exact signs.
 pub fn plain_cramer<const D: usize>(corners: &[Vector<D>; D], ray: &Ray<D>) -> [bool; 2] {
-    let single = cramer(corners, &ray.origin, &ray.direction, Slips::PUBLISHED);
+    let single = cramer(corners, &ray.origin, &ray.direction, Deviations::PUBLISHED);
     let wide: [Vector64<D>; D] = corners.map(|c| widen(&c));
-    let double = cramer(&wide, &widen(&ray.origin), &widen(&ray.direction), Slips::PUBLISHED);
+    let double = cramer(&wide, &widen(&ray.origin), &widen(&ray.direction), Deviations::PUBLISHED);
     [
         single.0 > 0.0 && single.1.iter().all(|&l| l >= 0.0), // NaN, of a flat simplex, is no hit
         double.0 > 0.0 && double.1.iter().all(|&l| l >= 0.0),
@@ -24,22 +24,22 @@ pub(super) fn cramer<T: RealField + Copy, const D: usize>(
     corners: &[Point<T, D>; D],
     origin: &Point<T, D>,
     direction: &Point<T, D>,
-    slips: Slips,
+    deviations: Deviations,
 ) -> (T, [T; D]) {
     let a = corners[0];
     let mut columns: [Point<T, D>; D] = std::array::from_fn(|i| if i == 0 { -direction } else { corners[i] - a });
     let mut right = origin - a;
-    if slips.printed_equations {
+    if deviations.printed_equations {
         columns[0] = *direction;
         if D == 4 {
             columns[3] = corners[3].map(|x| x - a[0]);
             right[1] = origin[1] - a[0];
         }
     }
-    let denominator = laplace(&columns, slips.contracted);
+    let denominator = laplace(&columns, deviations.contracted);
     let solution: [T; D] = std::array::from_fn(|i| {
         let column = std::mem::replace(&mut columns[i], right);
-        let numerator = laplace(&columns, slips.contracted);
+        let numerator = laplace(&columns, deviations.contracted);
         columns[i] = column;
         numerator / denominator
     });
@@ -91,7 +91,7 @@ fn minor<T: RealField + Copy, const D: usize>(
 mod tests {
     use super::*;
     use crate::geometry::determinant;
-    use crate::occlusion::{Sampler, Sequence};
+    use crate::trace::{Sampler, Sequence};
 
     fn determinants<const D: usize>() {
         let mut sequence = Sequence::new(Sampler::Random, 3, 4);
@@ -119,7 +119,7 @@ mod tests {
     fn cramer_finds_the_crossing() {
         let corners: [Vector<4>; 4] = std::array::from_fn(|i| Vector::from_fn(|r, _| if r == i { 2.0 } else { 0.0 }));
         let ray = Ray::new(Vector::zeros(), Vector::from([0.25, 0.25, 0.5, 0.5]));
-        let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, Slips::PUBLISHED);
+        let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, Deviations::PUBLISHED);
         assert!((t - 4.0 / 3.0).abs() < 1e-6, "{t}");
         let expected = [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0];
         assert!(weights.iter().zip(expected).all(|(w, e): (&f32, f32)| (w - e).abs() < 1e-6), "{weights:?}");
@@ -132,8 +132,8 @@ mod tests {
         // In 3D that is the whole slip of Eq. 2.7; the point is the same.
         let corners: [Vector<3>; 3] = std::array::from_fn(|i| Vector::from_fn(|r, _| if r == i { 2.0 } else { 0.0 }));
         let ray = Ray::new(Vector::zeros(), Vector::from([0.25, 0.25, 0.5]));
-        let printed = Slips { printed_equations: true, ..Slips::PUBLISHED };
-        let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, Slips::PUBLISHED);
+        let printed = Deviations { printed_equations: true, ..Deviations::PUBLISHED };
+        let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, Deviations::PUBLISHED);
         let (backwards, same) = cramer(&corners, &ray.origin, &ray.direction, printed);
         assert_eq!((t, backwards), (2.0, -2.0));
         assert_eq!((weights, same[1..].to_vec()), ([0.25, 0.25, 0.5], vec![0.25, 0.5]));

@@ -1,4 +1,4 @@
-//! The algorithm as the thesis published it (Djami 2021, 2.1.2, 2.3, 4.3, 4.4 and 4.6.3), slips and all, to show what its
+//! The algorithm as the thesis published it (Djami 2021, 2.1.2, 2.3, 4.3, 4.4 and 4.6.3), deviations and all, to show what its
 //! figures show: objects that are fully occluded, or not at all. Not for any other use.
 //!
 //! Of a vertex O, in `f32` throughout:
@@ -10,35 +10,35 @@
 //!    l_i, with l_1 = 1 - l_2 - ...; determinants by Laplace's expansion along their first row.
 //! 4. Occlusion is the share of the rays that hit something. The cosine of Eq. 2.8 is left out.
 //!
-//! The slip that makes all or nothing is the third. The vertex's own simplices are tested like any other, and there t is 0:
+//! The deviation that makes all or nothing is the third. The vertex's own simplices are tested like any other, and there t is 0:
 //! - for A, as O - A = 0, all numerators are exactly 0: every ray hits, the vertex is fully occluded;
 //! - for other vertices O - A equals another column. Products cancel exactly where the expansion subtracts them from each
 //!   other, and leave rounding noise where it sums them in another order: then the sign of noise decides. The noise in t
 //!   is the same for all rays of the vertex, so they all hit, or all miss.
 //!
 //! What the compiler makes of a sum thus decides between black and white. OpenCL lets it fuse products into sums unless
-//! forbidden; [`Slips::contracted`] does that, and other vertices change sides.
+//! forbidden; [`Deviations::contracted`] does that, and other vertices change sides.
 //!
-//! Each slip is a switch of its own ([`Slips`]); with all of them off the truth is left. The hierarchy is used to save time:
+//! Each deviation is a switch of its own ([`Deviations`]); with all of them off the truth is left. The hierarchy is used to save time:
 //! hits that rounding finds outside a simplex's box aren't seen.
 
 mod cramer;
 
 pub use cramer::plain_cramer;
 
-use rayon::prelude::*;
-
 use cramer::{cramer, laplace};
 
-use super::{Cancelled, Sampler, Sequence, Settings, Site};
 use crate::accel::Tracer;
 use crate::geometry::{Frame, Ray, Vector};
-use crate::mesh::Incidence;
-use crate::progress::Progress;
+use crate::progress::{Cancelled, Progress};
+use crate::trace::{Sampler, Sampling, Sequence, ShadingPoint, Surroundings};
+
+/// Directions between two looks at whether to go on.
+const LOOK: u32 = 1 << 10;
 
 /// What the published algorithm does otherwise than it should. Each can be taken back by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Slips {
+pub struct Deviations {
     /// Angles drawn uniformly, and no cosine: neither the density of the integral nor that of the sphere. Without it
     /// directions are cosine-weighted.
     pub uniform_angles: bool,
@@ -49,14 +49,14 @@ pub struct Slips {
     pub own_simplices: bool,
     /// Cramer's rule in `f32`. Without it signs are exact, whatever the following two say.
     pub single_precision: bool,
-    /// Products are fused into sums, as OpenCL compilers may. Not a slip in the text.
+    /// Products are fused into sums, as OpenCL compilers may. Not a deviation of the text.
     pub contracted: bool,
     /// Eq. 2.7 and 4.3 as printed: t counts backwards, and A's first coordinate is subtracted in rows where it doesn't
     /// belong. No program with this in it shows a scene, so it is a slip of the printed text alone.
     pub printed_equations: bool,
 }
 
-impl Slips {
+impl Deviations {
     /// The algorithm as its text describes it.
     pub const PUBLISHED: Self = Self {
         uniform_angles: true,
@@ -67,7 +67,7 @@ impl Slips {
         printed_equations: false,
     };
 
-    /// All slips taken back.
+    /// All deviations taken back.
     pub const NONE: Self = Self {
         uniform_angles: false,
         hits_at_zero: false,
@@ -75,43 +75,6 @@ impl Slips {
         single_precision: false,
         ..Self::PUBLISHED
     };
-}
-
-/// The value 1 - occlusion at every vertex, by `settings.samples` rays each; `settings.sampler` isn't asked.
-///
-/// # Errors
-/// [`Cancelled`] if `progress` says so.
-pub fn as_published<const D: usize>(
-    tracer: &Tracer<D>,
-    slips: Slips,
-    settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<Vec<f32>, Cancelled> {
-    at_wanted(tracer, slips, settings, None, progress)
-}
-
-/// [`as_published`] at those vertices that are wanted, and 1 elsewhere.
-pub(super) fn at_wanted<const D: usize>(
-    tracer: &Tracer<D>,
-    slips: Slips,
-    settings: &Settings,
-    wanted: Option<&[bool]>,
-    progress: &dyn Progress,
-) -> Result<Vec<f32>, Cancelled> {
-    tracer.prepare();
-    let published = AsPublished::new(tracer, slips);
-    let value = |vertex| {
-        if progress.cancelled() {
-            return Err(Cancelled);
-        }
-        if wanted.is_some_and(|wanted| !wanted[vertex as usize]) {
-            return Ok(1.0);
-        }
-        let value = published.at_vertex(vertex, settings);
-        progress.advance(1);
-        Ok(value)
-    };
-    (0..tracer.mesh().vertices.len() as u32).into_par_iter().map(value).collect()
 }
 
 /// The unit normals by the formal determinants of the simplices' edges, in the order of their vertices; zero where there
@@ -135,32 +98,38 @@ fn normals<const D: usize>(tracer: &Tracer<D>) -> Vec<Vector<D>> {
 /// The algorithm on a mesh.
 #[derive(Debug)]
 pub struct AsPublished<'t, const D: usize> {
-    tracer: &'t Tracer<'t, D>,
-    slips: Slips,
-    incidence: Incidence,
+    tracer: &'t Tracer<D>,
+    deviations: Deviations,
     normals: Vec<Vector<D>>,
 }
 
 impl<'t, const D: usize> AsPublished<'t, D> {
-    /// With these slips.
-    pub fn new(tracer: &'t Tracer<'t, D>, slips: Slips) -> Self {
-        Self { tracer, slips, incidence: Incidence::new(tracer.mesh()), normals: normals(tracer) }
+    /// With these deviations.
+    pub fn new(tracer: &'t Tracer<D>, deviations: Deviations) -> Self {
+        Self { tracer, deviations, normals: normals(tracer) }
     }
 
-    /// The value 1 - occlusion at a vertex, by `settings.samples` rays; `settings.sampler` isn't asked.
-    pub fn at_vertex(&self, vertex: u32, settings: &Settings) -> f32 {
+    /// The value 1 - occlusion at a vertex, by `sampling.samples` rays; neither sampler nor target are asked.
+    ///
+    /// # Errors
+    /// [`Cancelled`] if `progress` says so.
+    pub fn at_vertex(&self, vertex: u32, sampling: &Sampling, progress: &dyn Progress) -> Result<f32, Cancelled> {
         let normal = &self.normals[vertex as usize];
         if normal.amax() == 0.0 {
-            return 1.0;
+            return Ok(1.0);
         }
-        let own = (!self.slips.own_simplices).then(|| Site::at_vertex(self.tracer, &self.incidence, vertex));
-        let mut sequence = Sequence::new(Sampler::Random, settings.seed, u64::from(vertex));
+        let own =
+            (!self.deviations.own_simplices).then(|| Surroundings::of(self.tracer, &ShadingPoint::Vertex(vertex)));
+        let mut sequence = Sequence::new(Sampler::Random, sampling.seed, u64::from(vertex));
         let origin = self.tracer.mesh().vertices[vertex as usize];
         let frame = Frame::new(normal);
         let (mut rays, mut hits) = (0u32, 0u32);
         // About every second direction is on the normal's side; where rounding leaves none, there is no value.
-        for _ in 0..settings.samples.saturating_mul(64) {
-            let direction = if self.slips.uniform_angles {
+        for tried in 0..sampling.samples.saturating_mul(64) {
+            if tried % LOOK == 0 && progress.cancelled() {
+                return Err(Cancelled);
+            }
+            let direction = if self.deviations.uniform_angles {
                 let point = origin + sphere_point(&mut sequence);
                 point - origin
             } else {
@@ -170,16 +139,16 @@ impl<'t, const D: usize> AsPublished<'t, D> {
                 continue;
             }
             rays += 1;
-            hits += u32::from(self.hits_something(&Ray::new(origin, direction), own.as_ref(), settings.max_distance));
-            if rays == settings.samples {
+            hits += u32::from(self.hits_something(&Ray::new(origin, direction), own.as_ref(), sampling.max_distance));
+            if rays == sampling.samples {
                 break;
             }
         }
-        1.0 - (f64::from(hits) / f64::from(rays.max(1))) as f32
+        Ok(1.0 - (f64::from(hits) / f64::from(rays.max(1))) as f32)
     }
 
     /// `own` is what the vertex's own simplices hide, where they aren't tested like others.
-    fn hits_something(&self, ray: &Ray<D>, own: Option<&Site<D>>, limit: f32) -> bool {
+    fn hits_something(&self, ray: &Ray<D>, own: Option<&Surroundings<D>>, limit: f32) -> bool {
         let mesh = self.tracer.mesh();
         if own.is_some_and(|own| own.hides(ray)) {
             return true;
@@ -189,11 +158,11 @@ impl<'t, const D: usize> AsPublished<'t, D> {
             if own.is_some() && corners.contains(&ray.origin) {
                 return false;
             }
-            if !self.slips.single_precision {
+            if !self.deviations.single_precision {
                 return self.tracer.hits(simplex, ray, limit);
             }
-            let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, self.slips);
-            let ahead = if self.slips.hits_at_zero { t >= 0.0 } else { t > 0.0 };
+            let (t, weights) = cramer(&corners, &ray.origin, &ray.direction, self.deviations);
+            let ahead = if self.deviations.hits_at_zero { t >= 0.0 } else { t > 0.0 };
             ahead && t <= limit && weights.iter().all(|&w| w >= 0.0)
         })
     }

@@ -6,25 +6,55 @@
 //! holes, not with their square.
 
 use super::polygon::{Hole, Region, Relation};
+use crate::progress::Progress;
 
 /// More holes than this in one region, and it is halved.
 const CROWD: usize = 10;
 
-/// Pieces were asked for beyond the budget.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Spent;
+/// Steps of work, of about a microsecond or less each, between two looks at whether to go on.
+pub(super) const LOOK: usize = 1 << 12;
 
-/// Counts the pieces against a budget.
-#[derive(Clone, Debug)]
-pub(super) struct Counter {
-    pub pieces: usize,
-    pub budget: usize,
+/// Why the sum isn't finished.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Spent {
+    /// More pieces were asked for than the budget has.
+    Budget,
+    /// The work was cancelled.
+    Cancelled,
 }
 
-impl Counter {
-    fn count(&mut self) -> Result<(), Spent> {
+/// Counts the pieces against a budget, and the work against the patience of whoever watches.
+pub(super) struct Counter<'p> {
+    pieces: usize,
+    budget: usize,
+    /// Steps since the last look.
+    steps: usize,
+    progress: &'p dyn Progress,
+}
+
+impl<'p> Counter<'p> {
+    /// With so many pieces to spend.
+    pub fn new(budget: usize, progress: &'p dyn Progress) -> Self {
+        Self { pieces: 0, budget, steps: 0, progress }
+    }
+
+    /// One more piece, with so many holes that may reach into it.
+    fn count(&mut self, holes: usize) -> Result<(), Spent> {
         self.pieces += 1;
-        if self.pieces > self.budget { Err(Spent) } else { Ok(()) }
+        if self.pieces > self.budget {
+            return Err(Spent::Budget);
+        }
+        self.look(1 + holes)
+    }
+
+    /// So many more steps of work.
+    pub fn look(&mut self, steps: usize) -> Result<(), Spent> {
+        self.steps += steps;
+        if self.steps < LOOK {
+            return Ok(());
+        }
+        self.steps = 0;
+        if self.progress.cancelled() { Err(Spent::Cancelled) } else { Ok(()) }
     }
 }
 
@@ -45,7 +75,7 @@ pub(super) fn exposed<const D: usize>(
     // Not by recursion: where thousands of holes meet in one point the stack would not do.
     let mut tasks: Vec<Task<D>> = vec![(region, (0..holes.len() as u32).collect(), usize::MAX)];
     while let Some((region, mut candidates, before)) = tasks.pop() {
-        counter.count()?;
+        counter.count(candidates.len())?;
         // The corners of half a sphere all lie on a line, and can't tell on which side of it they are meant to be.
         if region.is_nearly_half()
             && let Some(line) = region.bisector()

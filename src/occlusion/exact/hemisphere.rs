@@ -1,13 +1,14 @@
 //! The hemisphere over a point, the occluders in it, and the sum over the facets of what they leave open.
 
 use super::directions::{DirectionBox, DirectionTree};
-use super::exposed::{Counter, Spent, exposed};
+use super::exposed::{Counter, LOOK, Spent, exposed};
 use super::generators::{Generators, INVERTED_NORMAL, Signed, direction};
 use super::plane::Plane;
 use super::polygon::{Hole, Region};
 use super::span::Span;
 use super::trace::{SimplicialCone, Trace, facet_above_horizon, trace};
 use crate::geometry::{Vector, widen};
+use crate::progress::{Cancelled, Progress, Silent};
 
 /// How much work one point may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +40,21 @@ pub struct OverBudget {
     pub occluders: usize,
     /// What was exceeded.
     pub budget: Budget,
+}
+
+/// Why there is no value.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::occlusion) enum Stopped {
+    /// The work was cancelled.
+    Cancelled,
+    /// The view is too rich.
+    OverBudget(OverBudget),
+}
+
+impl From<Cancelled> for Stopped {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
 }
 
 /// The fraction of the cosine-weighted hemisphere over a point that is open: 1 if nothing occludes it, 0 if all is
@@ -140,12 +156,20 @@ impl<const D: usize> Hemisphere<D> {
 
     /// The fraction of the cosine-weighted hemisphere that the simplices added so far leave open.
     pub fn visible_fraction(&self, budget: Budget) -> Result<f64, OverBudget> {
-        let mut counter = Counter { pieces: 0, budget: budget.cones };
-        self.sum(&mut counter).map_err(|_| OverBudget {
-            point: self.point.iter().copied().collect(),
-            occluders: self.cones.len(),
-            budget,
+        // Nobody cancels, so it is the budget if there is no value.
+        self.sum(&mut Counter::new(budget.cones, &Silent)).map_err(|_| self.exceeded(budget))
+    }
+
+    /// [`Hemisphere::visible_fraction`], that stops as soon as `progress` wishes.
+    pub(in crate::occlusion) fn fraction(&self, budget: Budget, progress: &dyn Progress) -> Result<f64, Stopped> {
+        self.sum(&mut Counter::new(budget.cones, progress)).map_err(|spent| match spent {
+            Spent::Cancelled => Stopped::Cancelled,
+            Spent::Budget => Stopped::OverBudget(self.exceeded(budget)),
         })
+    }
+
+    fn exceeded(&self, budget: Budget) -> OverBudget {
+        OverBudget { point: self.point.iter().copied().collect(), occluders: self.cones.len(), budget }
     }
 
     fn sum(&self, counter: &mut Counter) -> Result<f64, Spent> {
@@ -170,6 +194,7 @@ impl<const D: usize> Hemisphere<D> {
             let region = Region::<D>::new(corners);
             tree.meeting(&bounds(span), &mut near);
             sides.forget();
+            counter.look(near.len() + 1)?;
             let mut holes = Vec::with_capacity(near.len());
             for &other in near.iter().filter(|&&other| other != facet.cone) {
                 let cone = &self.cones[other as usize];
@@ -191,14 +216,16 @@ impl<const D: usize> Hemisphere<D> {
 
     /// The solid angle of the horizon that is open from above.
     fn open_horizon(&self, horizon: &Plane<D>, counter: &mut Counter) -> Result<f64, Spent> {
-        let mut holes: Vec<Hole<D>> = self
-            .cones
-            .iter()
-            .filter_map(|cone| match trace(horizon, &self.generators, cone, |id| self.generators.height(id)) {
-                Trace::Across(corners) | Trace::Above(corners) => Hole::new(corners),
-                Trace::None | Trace::Below(_) => None,
-            })
-            .collect();
+        let mut holes: Vec<Hole<D>> = Vec::new();
+        for cones in self.cones.chunks(LOOK) {
+            counter.look(cones.len())?;
+            holes.extend(cones.iter().filter_map(|cone| {
+                match trace(horizon, &self.generators, cone, |id| self.generators.height(id)) {
+                    Trace::Across(corners) | Trace::Above(corners) => Hole::new(corners),
+                    Trace::None | Trace::Below(_) => None,
+                }
+            }));
+        }
         let mut sum = 0.0;
         for orthant in Region::whole() {
             sum += exposed(orthant, &mut holes, counter)?;

@@ -35,7 +35,8 @@
 //! within a simplex, as the visible point of a voxel does, that simplex is to be left out. Simplices need not be
 //! sorted, oriented, closed or disjoint; one whose hyperplane contains p occludes nothing.
 //!
-//! Among the simplices of a mesh [`at_vertices`] does all this, with the hierarchy as a sieve.
+//! Among the simplices of a mesh [`Hemisphere::over`] finds all of these, with the hierarchy as a sieve, and
+//! [`super::Estimator::Exact`] takes the values at many points.
 //!
 //! All simplices of a scene may be given: those below the horizon are dropped at once. Of bodies that are closed, and
 //! known to be seen from outside, the simplices turned away from p may be left out, for half the time.
@@ -49,8 +50,8 @@ mod polygon;
 mod precise;
 mod span;
 mod trace;
-mod tracing;
+mod view;
 
+pub(super) use hemisphere::Stopped;
 pub use hemisphere::{Budget, Hemisphere, OverBudget, visible_fraction};
-pub use tracing::{at_point, at_vertex, at_vertices};
-pub(super) use tracing::{at_point_if_simple, at_vertex_if_simple, at_wanted};
+pub(super) use view::{value, value_if_simple};

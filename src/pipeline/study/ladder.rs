@@ -1,16 +1,19 @@
 //! Methods against the truth, with more and more rays.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::Errors;
+use super::Unheard;
 use crate::accel::Tracer;
-use crate::mesh::Incidence;
-use crate::occlusion::exact::{self, Budget};
-use crate::occlusion::{AsPublished, Cancelled, Error, Sampler, Settings, Slips, Stream, adaptive};
+use crate::occlusion::exact::{Budget, Hemisphere};
+use crate::occlusion::{AsPublished, Cancelled, Deviations, Estimates, Estimator};
 use crate::pipeline::RunError;
 use crate::progress::Progress;
+use crate::trace::cpu::{CpuBackend, PacketTracer};
+use crate::trace::{Sampler, Sampling, ShadingPoint};
 
 /// At most so many vertices are looked at.
 const VERTICES: usize = 200;
@@ -90,23 +93,21 @@ pub struct Rung {
 
 /// A scene, and the vertices that are looked at.
 #[derive(Debug)]
-pub struct Bench<'t, const D: usize> {
-    pub tracer: &'t Tracer<'t, D>,
+pub struct Bench<const D: usize> {
+    pub tracer: Arc<Tracer<D>>,
     pub vertices: Vec<u32>,
-    incidence: Incidence,
     pub seed: u64,
 }
 
-impl<'t, const D: usize> Bench<'t, D> {
+impl<const D: usize> Bench<D> {
     /// Takes vertices that belong to something, evenly spread over their list. None if there are none.
-    pub fn new(tracer: &'t Tracer<'t, D>, seed: u64) -> Option<Self> {
-        let mesh = tracer.mesh();
-        let incidence = Incidence::new(mesh);
+    pub fn new(tracer: Arc<Tracer<D>>, seed: u64) -> Option<Self> {
+        let (mesh, incidence) = (tracer.mesh(), tracer.incidence());
         let mut vertices: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
         vertices.retain(|&v| !incidence.around(mesh.identity[v as usize]).is_empty());
         let (count, all) = (vertices.len().min(VERTICES), vertices.len());
         let vertices: Vec<u32> = (0..count).map(|i| vertices[(2 * i + 1) * all / (2 * count)]).collect();
-        (!vertices.is_empty()).then_some(Self { tracer, vertices, incidence, seed })
+        (!vertices.is_empty()).then_some(Self { tracer, vertices, seed })
     }
 
     /// The true values.
@@ -116,22 +117,23 @@ impl<'t, const D: usize> Bench<'t, D> {
             .vertices
             .par_iter()
             .with_max_len(1)
-            .map_init(Stream::default, |stream, &vertex| {
+            .map_init(PacketTracer::default, |packets, &vertex| {
                 if progress.cancelled() {
                     return Err(Cancelled.into());
                 }
                 let start = Instant::now();
-                let exact = exact::at_vertex(self.tracer, &self.incidence, vertex, BUDGET);
+                let point = ShadingPoint::Vertex(vertex);
+                let view = Hemisphere::over(&self.tracer, &point);
+                let exact = view.map_or(Ok(1.0), |view| view.visible_fraction(BUDGET));
                 let seconds = start.elapsed().as_secs_f64();
                 progress.advance(1);
                 match exact {
-                    Ok(value) => Ok(Found { value, error: 0.0, seconds: Some(seconds) }),
-                    Err(Error::OverBudget { .. }) => {
-                        let settings = self.settings(Sampler::Sobol, LONG_RUN, usize::MAX);
-                        let long = stream.estimate_at_vertex(self.tracer, &self.incidence, &settings, None, vertex);
+                    Ok(value) => Ok(Found { value: value.clamp(0.0, 1.0), error: 0.0, seconds: Some(seconds) }),
+                    Err(_) => {
+                        let sampling = self.sampling(Sampler::Sobol, LONG_RUN, usize::MAX);
+                        let long = packets.estimate(&self.tracer, &point, &sampling, progress)?;
                         Ok(Found { value: long.value.into(), error: long.error.into(), seconds: None })
                     }
-                    Err(error) => Err(error.into()),
                 }
             })
             .collect();
@@ -146,9 +148,9 @@ impl<'t, const D: usize> Bench<'t, D> {
         })
     }
 
-    fn settings(&self, sampler: Sampler, samples: u32, repetition: usize) -> Settings {
+    fn sampling(&self, sampler: Sampler, samples: u32, repetition: usize) -> Sampling {
         let seed = self.seed.wrapping_add((repetition as u64).wrapping_mul(SEED_STEP));
-        Settings { sampler, samples, seed, max_distance: f32::INFINITY }
+        Sampling { sampler, ..Sampling::new(samples, seed) }
     }
 
     /// A method on all its rungs: 16 rays, 64, and so on.
@@ -160,21 +162,21 @@ impl<'t, const D: usize> Bench<'t, D> {
                 return Err(Cancelled.into());
             }
             let repetitions = match contender.way {
-                // The same again, mostly, and dear.
+                // The same again, mostly, and expensive.
                 Way::Adaptive => 1,
                 _ => (RAYS / samples as usize / self.vertices.len()).clamp(1, REPETITIONS),
             };
-            let (found, seconds) = self.values(contender, samples, repetitions);
+            let (found, seconds) = self.values(contender, samples, repetitions, progress)?;
             progress.advance(1);
-            let rays: u64 = found.iter().map(|f| u64::from(f.1)).sum();
-            let pairs = found.iter().zip(truth.values.iter().cycle());
+            let pairs = found.values.iter().zip(truth.values.iter().cycle());
             Ok(Rung {
                 method: contender.name,
                 samples,
                 repetitions,
-                errors: Errors::of(pairs.map(|((value, _), truth)| f64::from(*value) - truth)),
+                errors: Errors::of(pairs.map(|(value, truth)| f64::from(*value) - truth)),
                 seconds,
-                rays_per_second: rays as f64 / found.len() as f64 / seconds * rayon::current_num_threads() as f64,
+                rays_per_second: found.rays as f64 / found.values.len() as f64 / seconds
+                    * rayon::current_num_threads() as f64,
             })
         });
         let climbed = climbed.collect();
@@ -182,44 +184,56 @@ impl<'t, const D: usize> Bench<'t, D> {
         climbed
     }
 
-    /// All vertices' values with the number of rays asked for each, repetition after repetition; and the seconds a
-    /// vertex and thread.
-    fn values(&self, contender: Contender, samples: u32, repetitions: usize) -> (Vec<(f32, u32)>, f64) {
+    /// All vertices' values, repetition after repetition, and the rays asked in all; and the seconds a vertex and thread.
+    fn values(
+        &self,
+        contender: Contender,
+        samples: u32,
+        repetitions: usize,
+        progress: &dyn Progress,
+    ) -> Result<(Estimates, f64), RunError> {
         let tasks: Vec<(usize, u32)> =
             (0..repetitions).flat_map(|r| self.vertices.iter().map(move |&vertex| (r, vertex))).collect();
+        let all = |values: Vec<f32>| {
+            let rays = u64::from(samples) * values.len() as u64;
+            Estimates { values, errors: Vec::new(), rays }
+        };
+        let backend = CpuBackend::new(Arc::clone(&self.tracer));
+        let points: Vec<ShadingPoint<D>> = tasks.iter().map(|task| ShadingPoint::Vertex(task.1)).collect();
         let start = Instant::now();
-        let values: Vec<(f32, u32)> = match contender.way {
+        let found: Result<Estimates, RunError> = match contender.way {
             Way::Rays(sampler) => {
-                let stream = |stream: &mut Stream<D>, &(repetition, vertex): &(usize, u32)| {
-                    let settings = self.settings(sampler, samples, repetition);
-                    (stream.at_vertex(self.tracer, &self.incidence, &settings, vertex), samples)
+                let value = |packets: &mut PacketTracer<D>, (&(repetition, _), point): (&(usize, u32), _)| {
+                    let sampling = self.sampling(sampler, samples, repetition);
+                    Ok(packets.estimate(&self.tracer, point, &sampling, progress)?.value)
                 };
-                tasks.par_iter().map_init(Stream::default, stream).collect()
+                tasks.par_iter().zip(&points).map_init(PacketTracer::default, value).collect::<Result<_, _>>().map(all)
             }
             Way::Adaptive => {
-                let value = |stream: &mut Stream<D>, &(repetition, vertex): &(usize, u32)| {
-                    let settings = self.settings(Sampler::Sobol, samples, repetition);
-                    let found = adaptive(stream, self.tracer, &self.incidence, &settings, None, vertex);
-                    (found.value, found.rays)
-                };
-                tasks.par_iter().with_max_len(1).map_init(Stream::default, value).collect()
+                let estimator = Estimator::Adaptive(self.sampling(Sampler::Sobol, samples, 0));
+                Ok(estimator.estimate(&backend, &points, None, &Unheard(progress))?)
             }
             Way::Published => {
-                let published = AsPublished::new(self.tracer, Slips::PUBLISHED);
+                let published = AsPublished::new(&self.tracer, Deviations::PUBLISHED);
                 let value = |&(repetition, vertex): &(usize, u32)| {
-                    (published.at_vertex(vertex, &self.settings(Sampler::Random, samples, repetition)), samples)
+                    Ok(published.at_vertex(vertex, &self.sampling(Sampler::Random, samples, repetition), progress)?)
                 };
-                tasks.par_iter().map(value).collect()
+                tasks.par_iter().map(value).collect::<Result<_, _>>().map(all)
             }
         };
         let threads = rayon::current_num_threads().min(tasks.len()) as f64;
-        (values, start.elapsed().as_secs_f64() * threads / tasks.len() as f64)
+        Ok((found?, start.elapsed().as_secs_f64() * threads / tasks.len() as f64))
     }
 
-    /// The values of the published algorithm with other slips.
-    pub fn with_slips(&self, slips: Slips, samples: u32) -> Vec<f32> {
-        let published = AsPublished::new(self.tracer, slips);
-        let settings = self.settings(Sampler::Random, samples, 0);
-        self.vertices.par_iter().map(|&vertex| published.at_vertex(vertex, &settings)).collect()
+    /// The values of the published algorithm with other deviations.
+    pub fn with_deviations(
+        &self,
+        deviations: Deviations,
+        samples: u32,
+        progress: &dyn Progress,
+    ) -> Result<Vec<f32>, Cancelled> {
+        let published = AsPublished::new(&self.tracer, deviations);
+        let sampling = self.sampling(Sampler::Random, samples, 0);
+        self.vertices.par_iter().map(|&vertex| published.at_vertex(vertex, &sampling, progress)).collect()
     }
 }

@@ -20,6 +20,7 @@ mod precision;
 mod tables;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::build::AnyMesh;
 use super::files::write_whole;
@@ -92,8 +93,8 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
     }
     let empty = || refuse(&plan.scenes[occlusion.scene].path, "the scene is empty: there is no occlusion to study");
     let mut study = match prepared?.meshes.swap_remove(occlusion.scene) {
-        Some(AnyMesh::Three(mesh)) => of_mesh(pipeline, &mesh, occlusion.scene, seed, progress)?,
-        Some(AnyMesh::Four(mesh)) => of_mesh(pipeline, &mesh, occlusion.scene, seed, progress)?,
+        Some(AnyMesh::Three(mesh)) => of_mesh(pipeline, mesh, occlusion.scene, seed, progress)?,
+        Some(AnyMesh::Four(mesh)) => of_mesh(pipeline, mesh, occlusion.scene, seed, progress)?,
         None => None,
     }
     .ok_or_else(empty)?;
@@ -110,14 +111,15 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
 /// All measurements on one scene; none if nothing is in it.
 fn of_mesh<const D: usize>(
     pipeline: &Pipeline,
-    mesh: &Mesh<D>,
+    mesh: Mesh<D>,
     scene: usize,
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Option<Study>, RunError> {
-    let tracer = Tracer::new(mesh);
-    tracer.prepare();
-    let Some(bench) = Bench::new(&tracer, seed) else { return Ok(None) };
+    let tracer = Arc::new(Tracer::new(mesh));
+    tracer.prepare_wide();
+    let mesh = tracer.mesh();
+    let Some(bench) = Bench::new(Arc::clone(&tracer), seed) else { return Ok(None) };
     let truth = bench.truth(progress)?;
     let mut rungs = Vec::new();
     for contender in ladder::CONTENDERS {
@@ -142,6 +144,21 @@ fn of_mesh<const D: usize>(
         notes: Vec::new(),
         files: Vec::new(),
     }))
+}
+
+/// Hears the wish to stop, and keeps inner steps to itself.
+struct Unheard<'p>(&'p dyn Progress);
+
+impl Progress for Unheard<'_> {
+    fn begin(&self, _stage: &str, _total: u64) {}
+
+    fn advance(&self, _steps: u64) {}
+
+    fn end(&self) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
 }
 
 /// How values differ from the true ones.

@@ -3,17 +3,20 @@
 //! `flat` and `smooth` shading spread the vertices' values over each simplex; the reference is the value at each visible
 //! point itself. The image is the pipeline's first of the scene, with fewer voxels.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::Errors;
+use super::{Errors, Unheard};
 use crate::accel::Tracer;
 use crate::occlusion::exact::Budget;
-use crate::occlusion::{self, Error, Method, Sampler, Settings};
+use crate::occlusion::{Error, Estimator};
 use crate::pipeline::RunError;
 use crate::pipeline::build::camera;
 use crate::pipeline::plan::RenderPlan;
-use crate::progress::{Progress, Silent};
-use crate::render::{Channel, Picture, Shading};
+use crate::progress::Progress;
+use crate::render::{Aov, Renderer, Shading};
+use crate::trace::cpu::CpuBackend;
+use crate::trace::{RayBackend, Sampling, ShadingPoint};
 use crate::volume::{Array, Values};
 
 /// At most about so many voxels.
@@ -57,32 +60,33 @@ fn reduced(dimensions: [usize; 3]) -> [usize; 3] {
 
 /// Measures; none if no voxel sees anything.
 pub fn measure<const D: usize>(
-    tracer: &Tracer<D>,
+    tracer: &Arc<Tracer<D>>,
     render: &RenderPlan,
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Option<Pictures>, RunError> {
     let dimensions = reduced(render.dimensions);
     let camera = camera::<D>(&render.camera)?;
-    let grid = camera.grid(dimensions);
     // Each is cancelled by the outer progress, and told as one step of it.
-    let watch = Steps(progress);
+    let watch = Unheard(progress);
+    let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Arc::clone(tracer)));
+    let points = ShadingPoint::vertices(tracer.mesh());
     let image = |shading: Shading| -> Result<Vec<Array>, Error> {
-        let picture = Picture { tracer, camera: camera.clone(), grid, shading, device: None };
-        picture.slab(0..dimensions[2], &[Channel::AmbientOcclusion, Channel::Opacity], &watch)
+        let renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading);
+        Ok(renderer.volume(&[Aov::AmbientOcclusion, Aov::Opacity], &watch)?.arrays)
     };
-    let settings = |samples| Settings { sampler: Sampler::Sobol, samples, seed, max_distance: f32::INFINITY };
+    let by_rays = |samples| Estimator::Sampled(Sampling::new(samples, seed));
     let vertex_samples = [16, 64, 256, 1024];
     let voxel_samples = [16, 64, 256];
     progress.begin("study: pictures", (2 * vertex_samples.len() + voxel_samples.len() + 1) as u64);
     let small = tracer.mesh().simplices.len() <= EXACT_UP_TO;
-    let (reference, name) = match small.then(|| image(Shading::Voxel(Method::Exact(BUDGET)))) {
+    let (reference, name) = match small.then(|| image(Shading::Voxel(Estimator::Exact(BUDGET)))) {
         Some(Ok(arrays)) => (arrays, "exact at each visible point".to_owned()),
         Some(Err(Error::Cancelled)) => return Err(Error::Cancelled.into()),
         // Too large, or too rich a view.
         _ => {
-            let sampled = Settings { seed: !seed, ..settings(REFERENCE) };
-            (image(Shading::Voxel(sampled.into()))?, format!("`voxel` shading by `sobol` with {REFERENCE} rays"))
+            let sampled = Estimator::Sampled(Sampling::new(REFERENCE, !seed));
+            (image(Shading::Voxel(sampled))?, format!("`voxel` shading by `sobol` with {REFERENCE} rays"))
         }
     };
     progress.advance(1);
@@ -103,14 +107,14 @@ pub fn measure<const D: usize>(
     for shading in ["flat", "smooth"] {
         for samples in vertex_samples {
             let (arrays, seconds) = timed(|| {
-                let values = occlusion::at_vertices(tracer, &settings(samples), &watch)?;
-                image(if shading == "flat" { Shading::Flat(&values) } else { Shading::Smooth(&values) })
+                let values = Arc::new(by_rays(samples).estimate(&*backend, &points, None, &watch)?);
+                image(if shading == "flat" { Shading::Flat(values) } else { Shading::Smooth(values) })
             })?;
             add(shading, samples, seconds, &arrays);
         }
     }
     for samples in voxel_samples {
-        let (arrays, seconds) = timed(|| image(Shading::Voxel(settings(samples).into())))?;
+        let (arrays, seconds) = timed(|| image(Shading::Voxel(by_rays(samples))))?;
         add("voxel", samples, seconds, &arrays);
     }
     progress.end();
@@ -129,27 +133,6 @@ fn timed<T>(work: impl Fn() -> Result<T, Error>) -> Result<(T, f64), Error> {
         if began.elapsed().as_secs_f64() > 0.1 {
             return Ok((result, least));
         }
-    }
-}
-
-/// Hears the wish to stop, and keeps inner steps to itself.
-struct Steps<'p>(&'p dyn Progress);
-
-impl Progress for Steps<'_> {
-    fn begin(&self, stage: &str, total: u64) {
-        Silent.begin(stage, total);
-    }
-
-    fn advance(&self, steps: u64) {
-        Silent.advance(steps);
-    }
-
-    fn end(&self) {
-        Silent.end();
-    }
-
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
     }
 }
 

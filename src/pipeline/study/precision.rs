@@ -6,9 +6,10 @@ use super::Errors;
 use super::ladder::{Bench, Truth};
 use crate::accel::Tracer;
 use crate::geometry::{Aabb, Ray, Vector, Vector64, narrow, widen};
-use crate::occlusion::{Cancelled, Sampler, Sequence, Slips, plain_cramer};
+use crate::occlusion::{Cancelled, Deviations, plain_cramer};
 use crate::pipeline::RunError;
 use crate::progress::Progress;
+use crate::trace::{Sampler, Sequence};
 
 /// Rays a vertex for the slips.
 const SAMPLES: u32 = 1024;
@@ -32,23 +33,23 @@ pub fn slips<const D: usize>(
     truth: &Truth,
     progress: &dyn Progress,
 ) -> Result<Vec<SlipEffect>, RunError> {
-    let published = Slips::PUBLISHED;
+    let published = Deviations::PUBLISHED;
     let variants = [
         ("as published", published),
-        ("as published, products fused into sums", Slips { contracted: true, ..published }),
-        ("only t > 0 counts", Slips { hits_at_zero: false, ..published }),
-        ("own simplices count by their fold", Slips { own_simplices: false, ..published }),
-        ("exact signs", Slips { single_precision: false, ..published }),
-        ("cosine-weighted directions", Slips { uniform_angles: false, ..published }),
-        ("all of these", Slips::NONE),
-        ("equations as printed", Slips { printed_equations: true, ..published }),
+        ("as published, products fused into sums", Deviations { contracted: true, ..published }),
+        ("only t > 0 counts", Deviations { hits_at_zero: false, ..published }),
+        ("own simplices count by their star", Deviations { own_simplices: false, ..published }),
+        ("exact signs", Deviations { single_precision: false, ..published }),
+        ("cosine-weighted directions", Deviations { uniform_angles: false, ..published }),
+        ("all of these", Deviations::NONE),
+        ("equations as printed", Deviations { printed_equations: true, ..published }),
     ];
     progress.begin("study: slips", variants.len() as u64);
     let found = variants.into_iter().map(|(what, slips)| {
         if progress.cancelled() {
             return Err(Cancelled.into());
         }
-        let values: Vec<f64> = bench.with_slips(slips, SAMPLES).into_iter().map(f64::from).collect();
+        let values: Vec<f64> = bench.with_deviations(slips, SAMPLES, progress)?.into_iter().map(f64::from).collect();
         progress.advance(1);
         Ok(SlipEffect {
             what,

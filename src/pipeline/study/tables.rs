@@ -67,7 +67,7 @@ pub(super) fn markdown(study: &Study) -> String {
     let long = match study.truth.long_runs {
         0 => String::new(),
         n => format!(
-            " For {n} vertices it is too dear; there the truth is a long run, whose standard error is at most {:.1e}.",
+            " For {n} vertices it is too expensive; there the truth is a long run, whose standard error is at most {:.1e}.",
             study.truth.error
         ),
     };

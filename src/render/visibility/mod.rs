@@ -14,6 +14,7 @@ mod footprint;
 mod raster;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -21,13 +22,12 @@ use serde::{Deserialize, Serialize};
 
 use self::raster::Raster;
 use super::Camera;
-use crate::accel::Tracer;
-use crate::occlusion::{Cancelled, Error, opencl};
 use crate::progress::Progress;
+use crate::trace::{Error, RayBackend};
 use crate::volume::Grid;
 
 /// Stands for a simplex where a voxel sees none.
-pub const NOTHING: u32 = u32::MAX;
+pub use crate::trace::NOTHING;
 
 /// How it is found out what voxels see. No picture depends on it, only the time it takes.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
@@ -42,36 +42,30 @@ pub enum Method {
     Rasterize,
 }
 
+/// Rays that are cast together.
+const RAYS: usize = 1 << 17;
+
 /// Finds what voxels see, slab after slab.
 #[derive(Clone, Debug)]
-pub struct Visibility<'s, const D: usize> {
-    tracer: &'s Tracer<'s, D>,
+pub struct Visibility<const D: usize> {
+    backend: Arc<dyn RayBackend<D>>,
     camera: Camera<D>,
     grid: Grid,
     raster: Option<Raster>,
-    method: Method,
-    device: Option<&'s opencl::Scene<'s, D>>,
 }
 
-impl<'s, const D: usize> Visibility<'s, D> {
-    /// Chooses the way, and prepares it.
-    pub fn new(tracer: &'s Tracer<'s, D>, camera: &Camera<D>, grid: &Grid, method: Method) -> Self {
-        let raster = (method != Method::RayCast).then(|| Raster::new(tracer.mesh(), camera, grid));
+impl<const D: usize> Visibility<D> {
+    /// Chooses the way, and prepares it. A backend apart from the processor casts rays rather than the processor
+    /// scan-converts, unless that was asked for.
+    pub fn new(backend: Arc<dyn RayBackend<D>>, camera: &Camera<D>, grid: &Grid, method: Method) -> Self {
+        let tracer = backend.tracer();
+        let cast = method == Method::RayCast || method == Method::Auto && backend.is_apart();
+        let raster = (!cast).then(|| Raster::new(tracer.mesh(), camera, grid));
         let raster = raster.filter(|r| method == Method::Rasterize || r.is_cheaper::<D>(grid, tracer.is_prepared()));
         if raster.is_none() {
             tracer.prepare();
         }
-        Self { tracer, camera: camera.clone(), grid: *grid, raster, method, device: None }
-    }
-
-    /// Has rays cast by this device, if one is given. One apart from the processor casts rays rather than the
-    /// processor scan-converts, unless that was asked for.
-    pub fn on(mut self, device: Option<&'s opencl::Scene<'s, D>>) -> Self {
-        self.device = device;
-        if self.method == Method::Auto && device.is_some_and(opencl::Scene::is_apart) {
-            self.raster = None;
-        }
-        self
+        Self { backend, camera: camera.clone(), grid: *grid, raster }
     }
 
     /// The way that was chosen; never [`Method::Auto`].
@@ -90,46 +84,23 @@ impl<'s, const D: usize> Visibility<'s, D> {
     /// # Errors
     /// [`Error::Cancelled`] if `progress` says so, [`Error::OpenCl`] if a device fails.
     pub fn first_hits(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
-        match (&self.raster, self.device) {
-            (Some(raster), _) => Ok(raster.first_hits(self.tracer, &self.camera, &self.grid, layers, progress)?),
-            (None, None) => Ok(self.ray_cast(layers, progress)?),
-            (None, Some(device)) => self.ray_cast_on(device, layers, progress),
+        match &self.raster {
+            Some(raster) => Ok(raster.first_hits(self.backend.tracer(), &self.camera, &self.grid, layers, progress)?),
+            None => self.ray_cast(layers, progress),
         }
     }
 
-    fn ray_cast_on(
-        &self,
-        device: &opencl::Scene<D>,
-        layers: Range<usize>,
-        progress: &dyn Progress,
-    ) -> Result<Vec<u32>, Error> {
+    fn ray_cast(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         let [width, height, _] = self.grid.dimensions;
-        let mut visible = Vec::with_capacity(self.grid.layer_len() * layers.len());
-        for k in layers {
-            let ray = |n: usize| self.camera.voxel_ray(&self.grid, [n % width, n / width, k]);
-            let rays: Vec<_> = (0..width * height).into_par_iter().map(ray).collect();
-            visible.extend(device.first_hits(&rays, progress)?);
+        let layer = self.grid.layer_len();
+        let voxels = layers.start * layer..layers.end * layer;
+        let mut visible = Vec::with_capacity(voxels.len());
+        for first in voxels.clone().step_by(RAYS) {
+            let ray = |n: usize| self.camera.voxel_ray(&self.grid, [n % width, n / width % height, n / layer]);
+            let rays: Vec<_> = (first..voxels.end.min(first + RAYS)).into_par_iter().map(ray).collect();
+            visible.extend(self.backend.first_hits(&rays, None, progress)?);
             progress.advance(rays.len() as u64);
         }
-        Ok(visible)
-    }
-
-    fn ray_cast(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Cancelled> {
-        let [width, height, _] = self.grid.dimensions;
-        let mut visible = vec![NOTHING; self.grid.layer_len() * layers.len()];
-        visible.par_chunks_mut(width).enumerate().try_for_each(|(row, voxels)| {
-            if progress.cancelled() {
-                return Err(Cancelled);
-            }
-            let (j, k) = (row % height, layers.start + row / height);
-            for (i, voxel) in voxels.iter_mut().enumerate() {
-                if let Some(hit) = self.tracer.closest_hit(&self.camera.voxel_ray(&self.grid, [i, j, k])) {
-                    *voxel = hit.simplex;
-                }
-            }
-            progress.advance(width as u64);
-            Ok(())
-        })?;
         Ok(visible)
     }
 }

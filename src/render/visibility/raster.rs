@@ -16,8 +16,7 @@ use super::footprint::Footprint;
 use crate::accel::Tracer;
 use crate::geometry::Vector;
 use crate::mesh::Mesh;
-use crate::occlusion::Cancelled;
-use crate::progress::Progress;
+use crate::progress::{Cancelled, Progress};
 use crate::render::camera::{Camera, Lens};
 use crate::volume::Grid;
 
@@ -185,7 +184,7 @@ const TILE: usize = 1 << 17;
 
 /// Rows of the image, counted through all layers, and what their voxels see so far.
 struct Tile<'a, const D: usize> {
-    tracer: &'a Tracer<'a, D>,
+    tracer: &'a Tracer<D>,
     camera: &'a Camera<D>,
     grid: &'a Grid,
     lens: &'a Lens<D>,

@@ -1,0 +1,154 @@
+//! The arrays that a picture can have (arbitrary output variables, as renderers call them), in one table.
+//!
+//! A row of the table says all there is to know of an array: its name, its type, its components, its unit, which columns
+//! of the G-buffer it is made of, and how. Keys in YAML, the JSON Schema, what a run computes and what files hold follow
+//! from it.
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::gbuffer::{Columns, GBuffer};
+use crate::volume::{Array, Kind, Values};
+
+/// Components of an array that has as many as the scene has dimensions.
+const DIMENSION: usize = usize::MAX;
+
+macro_rules! aovs {
+    ($($(#[$doc:meta])+ $variant:ident $name:literal: $kind:ident x $components:expr, $unit:literal,
+       [$($column:ident)+] |$g:ident, $i:ident| $value:expr;)+) => {
+        /// An array of a picture.
+        #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Aov {
+            $($(#[$doc])+ $variant,)+
+        }
+
+        impl Aov {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+
+            /// Its name, in files and in YAML.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name),+ }
+            }
+
+            /// The type of its numbers.
+            pub fn kind(self) -> Kind {
+                match self { $(Self::$variant => Kind::$kind),+ }
+            }
+
+            /// The unit of its numbers; empty if they have none.
+            pub fn unit(self) -> &'static str {
+                match self { $(Self::$variant => $unit),+ }
+            }
+
+            /// Numbers a voxel, for a scene of dimension D.
+            pub fn components<const D: usize>(self) -> usize {
+                match match self { $(Self::$variant => $components),+ } {
+                    DIMENSION => D,
+                    components => components,
+                }
+            }
+
+            /// The columns it is made of.
+            pub fn columns(self) -> Columns {
+                match self { $(Self::$variant => Columns::empty() $(.union(Columns::$column))+),+ }
+            }
+
+            /// The array itself, for all voxels of a G-buffer that has the columns.
+            pub fn array<const D: usize>(self, buffer: &GBuffer<D>) -> Array {
+                let values = match self {
+                    $(Self::$variant => Values::$kind(per_voxel(buffer, |$g, $i| $value)),)+
+                };
+                Array { name: self.name().to_owned(), components: self.components::<D>(), values }
+            }
+        }
+    };
+}
+
+aovs! {
+    /// Colour times ambient occlusion, and opacity, 4 x uint8: what volume rendering shows directly.
+    Rgba "rgba": U8 x 4, "", [ALBEDO OCCLUSION COVERAGE] |g, i| {
+        let [red, green, blue] = color(g, i);
+        [byte(red), byte(green), byte(blue), byte(g.coverage[i])]
+    };
+    /// Ambient occlusion, 1 = open; 1 where nothing is.
+    AmbientOcclusion "ambient_occlusion": F32 x 1, "", [OCCLUSION] |g, i| [g.occlusion[i]];
+    /// 1 where something is seen, 0 elsewhere; a fraction where voxels are supersampled.
+    Opacity "opacity": F32 x 1, "", [COVERAGE] |g, i| [g.coverage[i]];
+    /// Colour times ambient occlusion over white, 3 x float32; white where nothing is.
+    Rgb "rgb": F32 x 3, "", [ALBEDO OCCLUSION COVERAGE] |g, i| {
+        let coverage = g.coverage[i];
+        color(g, i).map(|c| c * coverage + (1.0 - coverage))
+    };
+    /// Distance from the eye; infinite where nothing is.
+    Depth "depth": F32 x 1, "scene units", [DEPTH] |g, i| [g.depth[i]];
+    /// The number of the object from 1, or 0 where nothing is.
+    Object "object": U16 x 1, "", [OBJECT] |g, i| [g.object[i]];
+    /// The unit normal of the simplex, on the side that is seen, D x float32; 0 where nothing is.
+    Normal "normal": F32 x DIMENSION, "", [NORMAL] |g, i| <[f32; D]>::from(g.normal[i]);
+    /// The unit normal interpolated over the simplex, on the side that is seen, D x float32; 0 where nothing is.
+    ShadingNormal "shading_normal": F32 x DIMENSION, "", [SHADING_NORMAL] |g, i| <[f32; D]>::from(g.shading_normal[i]);
+    /// The visible point in the scene's own coordinates, D x float32; 0 where nothing is.
+    Position "position": F32 x DIMENSION, "scene units", [POSITION] |g, i| <[f32; D]>::from(g.position[i]);
+    /// Barycentric coordinates of the visible point within its simplex, D x float32; 0 where nothing is.
+    Barycentric "barycentric": F32 x DIMENSION, "", [BARYCENTRIC] |g, i| g.barycentric[i];
+    /// The number of the simplex from 0, or 4294967295 where nothing is.
+    Simplex "simplex": U32 x 1, "", [SIMPLEX] |g, i| [g.simplex[i]];
+    /// The standard error of the ambient occlusion; 0 where nothing is.
+    OcclusionError "occlusion_error": F32 x 1, "", [ERROR] |g, i| [g.error[i]];
+    /// The part of the voxel that sees something, 0 to 1.
+    Coverage "coverage": F32 x 1, "", [COVERAGE] |g, i| [g.coverage[i]];
+}
+
+impl Aov {
+    /// Bytes a voxel.
+    pub fn bytes<const D: usize>(self) -> usize {
+        self.kind().size() * self.components::<D>()
+    }
+}
+
+/// Colour times occlusion.
+fn color<const D: usize>(buffer: &GBuffer<D>, i: usize) -> [f32; 3] {
+    buffer.albedo[i].map(|c| (c * buffer.occlusion[i]).clamp(0.0, 1.0))
+}
+
+/// A number from 0 to 1 as a byte: to the nearest, exactly, as adding a half loses nothing in f64.
+fn byte(x: f32) -> u8 {
+    (f64::from(x * 255.0) + 0.5) as u8
+}
+
+/// N numbers a voxel, on all cores.
+fn per_voxel<T: Send, const N: usize, const D: usize>(
+    buffer: &GBuffer<D>,
+    value: impl Fn(&GBuffer<D>, usize) -> [T; N] + Sync,
+) -> Vec<T> {
+    let tuples: Vec<[T; N]> = (0..buffer.len()).into_par_iter().with_min_len(4096).map(|i| value(buffer, i)).collect();
+    tuples.into_flattened()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_voxel_that_sees_nothing_is_transparent_white() {
+        let all = Aov::ALL.iter().fold(Columns::empty(), |all, aov| all | aov.columns());
+        let buffer = GBuffer::<4>::new([1; 3], 0..1, all);
+        assert_eq!(Aov::Rgba.array(&buffer).values, Values::U8(vec![255, 255, 255, 0]));
+        assert_eq!(Aov::Rgb.array(&buffer).values, Values::F32(vec![1.0; 3]));
+        for aov in Aov::ALL {
+            let array = aov.array(&buffer);
+            assert_eq!(
+                (array.values.kind(), array.values.len()),
+                (aov.kind(), aov.components::<4>()),
+                "{}",
+                aov.name()
+            );
+            // What YAML calls it is its name.
+            assert_eq!(serde_json::to_value(aov).unwrap(), aov.name());
+        }
+        assert_eq!((Aov::Normal.bytes::<4>(), Aov::Normal.bytes::<3>(), Aov::Rgba.bytes::<3>()), (16, 12, 4));
+    }
+}

@@ -1,0 +1,138 @@
+//! Dilation: the empty voxels around bodies take over the bodies' values.
+//!
+//! A contour or a volume rendering interpolates between voxels. Where a body ends, it mixes the body's colour and
+//! occlusion with whatever stands in the empty voxel beside it, and white or "open" there would make rims that nothing in
+//! the scene has. So values bleed outwards, layer upon layer of voxels, by normalised convolution (Knutsson and Westin
+//! 1993): a voxel next to some that have values takes their mean, weighted by coverage and by 1 / distance^2. Opacity
+//! and coverage stay what they are, and tell what is real.
+
+use rayon::prelude::*;
+
+use super::ImageFilter;
+use crate::occlusion::Error;
+use crate::progress::Progress;
+use crate::render::gbuffer::{Columns, GBuffer};
+
+/// The filter.
+#[derive(Clone, Copy, Debug)]
+pub struct Dilate {
+    /// How many layers of empty voxels are filled.
+    pub layers: usize,
+}
+
+/// A voxel's values on their way outwards.
+#[derive(Clone, Copy, Debug, Default)]
+struct Value {
+    /// How much it counts: coverage, or 1 where it was filled; 0 where there is nothing yet.
+    weight: f32,
+    albedo: [f32; 3],
+    occlusion: f32,
+}
+
+/// Takes some layers one step further: every voxel without a value that has a neighbour with one.
+fn step(values: &[Value], dimensions: [usize; 3]) -> Vec<Value> {
+    let [width, height, _] = dimensions;
+    let layers = values.len() / (width * height).max(1);
+    let near = |i: usize, end: usize| i.saturating_sub(1)..=(i + 1).min(end - 1);
+    let filled = |n: usize| {
+        let (i, j, k) = (n % width, n / width % height, n / width / height);
+        let (mut sum, mut total) = (Value::default(), 0.0);
+        for (z, y) in near(k, layers).flat_map(|z| near(j, height).map(move |y| (z, y))) {
+            for x in near(i, width) {
+                let value = &values[x + width * (y + height * z)];
+                if value.weight == 0.0 {
+                    continue;
+                }
+                let distance = i.abs_diff(x) + j.abs_diff(y) + k.abs_diff(z);
+                let weight = value.weight / distance as f32;
+                total += weight;
+                sum.occlusion += weight * value.occlusion;
+                (0..3).for_each(|c| sum.albedo[c] += weight * value.albedo[c]);
+            }
+        }
+        if total == 0.0 {
+            return Value::default();
+        }
+        Value { weight: 1.0, albedo: sum.albedo.map(|c| c / total), occlusion: sum.occlusion / total }
+    };
+    let next = values.par_iter().enumerate().with_min_len(1024);
+    next.map(|(n, value)| if value.weight > 0.0 { *value } else { filled(n) }).collect()
+}
+
+impl<const D: usize> ImageFilter<D> for Dilate {
+    fn columns(&self) -> Columns {
+        Columns::ALBEDO | Columns::OCCLUSION | Columns::COVERAGE
+    }
+
+    fn halo(&self) -> usize {
+        self.layers
+    }
+
+    fn apply(&self, input: &GBuffer<D>, out: &mut GBuffer<D>, progress: &dyn Progress) -> Result<(), Error> {
+        // Where the window ends and the image goes on, the outermost layer of each step misses neighbours; what that
+        // spoils moves inwards by a layer a step, and so stays within the halo.
+        let value = |i: usize| {
+            let (weight, albedo, occlusion) = (input.coverage[i], input.albedo[i], input.occlusion[i]);
+            Value { weight, albedo, occlusion }
+        };
+        let mut values: Vec<Value> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
+        for _ in 0..self.layers {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            values = step(&values, input.dimensions());
+        }
+        let range = input.range(&out.layers());
+        for (i, value) in values[range].iter().enumerate() {
+            if out.coverage[i] == 0.0 && value.weight > 0.0 {
+                (out.albedo[i], out.occlusion[i]) = (value.albedo, value.occlusion);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Silent;
+    use crate::render::filters::Chain;
+
+    const COLUMNS: Columns = Columns::SIMPLEX.union(Columns::ALBEDO).union(Columns::OCCLUSION).union(Columns::COVERAGE);
+
+    /// One voxel in the middle shows something dark and red.
+    fn one_voxel(thickness: usize) -> GBuffer<4> {
+        let dimensions = [9, 9, 9];
+        let filters: Vec<Box<dyn ImageFilter<4>>> = vec![Box::new(Dilate { layers: 3 })];
+        let mut chain = Chain::new(dimensions, COLUMNS, &filters);
+        let mut whole = GBuffer::new(dimensions, 0..0, COLUMNS);
+        for first in (0..9).step_by(thickness) {
+            let mut source = |layers: std::ops::Range<usize>| {
+                let mut buffer = GBuffer::new(dimensions, layers.clone(), COLUMNS);
+                if layers.contains(&4) {
+                    let middle = buffer.range(&(4..5)).start + 4 + 9 * 4;
+                    (buffer.simplex[middle], buffer.coverage[middle]) = (0, 0.5);
+                    (buffer.albedo[middle], buffer.occlusion[middle]) = ([1.0, 0.0, 0.0], 0.25);
+                }
+                Ok(buffer)
+            };
+            whole.append(chain.next(9.min(first + thickness), &mut source, &Silent).unwrap());
+        }
+        whole
+    }
+
+    #[test]
+    fn values_bleed_three_layers_and_opacity_does_not() {
+        let buffer = one_voxel(9);
+        for n in 0..buffer.len() {
+            let [i, j, k] = [n % 9, n / 9 % 9, n / 81];
+            let far = [i, j, k].into_iter().map(|c| c.abs_diff(4)).max().unwrap();
+            let expected = if far <= 3 { ([1.0, 0.0, 0.0], 0.25) } else { ([1.0; 3], 1.0) };
+            assert_eq!((buffer.albedo[n], buffer.occlusion[n]), expected, "{i} {j} {k}");
+            assert_eq!(buffer.coverage[n], if far == 0 { 0.5 } else { 0.0 });
+        }
+        for thickness in [1, 2, 7] {
+            assert_eq!(one_voxel(thickness), buffer, "{thickness}");
+        }
+    }
+}

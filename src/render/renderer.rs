@@ -1,0 +1,146 @@
+//! The renderer: all that decides what a picture shows, and the picture slab by slab.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::filters::{self, Chain, ImageFilter};
+use super::gbuffer::{Columns, GBuffer};
+use super::samples::Sampling;
+use super::surface::SurfacePass;
+use super::{Aov, Camera, NOTHING, Shading, Visibility, occlude, visibility};
+use crate::accel::Tracer;
+use crate::occlusion::Error;
+use crate::progress::Progress;
+use crate::trace::RayBackend;
+use crate::volume::{Array, Grid, Volume};
+
+/// The working set of a slab: so little that memory is used again for the next, not asked for anew.
+const SLAB_BYTES: usize = 16 << 20;
+
+/// Everything that decides what a picture shows.
+#[derive(Debug)]
+pub struct Renderer<const D: usize> {
+    /// What traces rays through the scene.
+    pub backend: Arc<dyn RayBackend<D>>,
+    /// Who looks.
+    pub camera: Camera<D>,
+    /// The voxels.
+    pub grid: Grid,
+    /// Where their ambient occlusion comes from.
+    pub shading: Shading,
+    /// How it is found out what voxels see; changes the time only.
+    pub visibility: visibility::Method,
+    /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
+    pub supersample: usize,
+    /// What looks at neighbouring voxels, in this order.
+    pub filters: Vec<Box<dyn ImageFilter<D>>>,
+}
+
+/// Some layers of a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slab {
+    /// Which layers.
+    pub layers: Range<usize>,
+    /// The arrays that were asked for, in that order.
+    pub arrays: Vec<Array>,
+    /// How many of their voxels see something.
+    pub seen: u64,
+}
+
+impl<const D: usize> Renderer<D> {
+    /// A picture with one sample a voxel and no filter.
+    pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
+        let grid = camera.grid(dimensions);
+        let visibility = visibility::Method::Auto;
+        Self { backend, camera, grid, shading, visibility, supersample: 1, filters: Vec::new() }
+    }
+
+    /// The scene.
+    pub fn tracer(&self) -> &Tracer<D> {
+        self.backend.tracer()
+    }
+
+    /// Makes the picture from the first layer to the last, and hands over slab after slab with these arrays. `thickness`
+    /// is how many layers a slab has; by default as many as need little memory. No value depends on it.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where a closed form is too expensive, and those of
+    /// `sink`.
+    pub fn render<E: From<Error>>(
+        &self,
+        aovs: &[Aov],
+        thickness: Option<usize>,
+        progress: &dyn Progress,
+        mut sink: impl FnMut(Slab) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let depth = self.grid.dimensions[2];
+        let thickness = thickness.unwrap_or_else(|| self.layers_within(SLAB_BYTES, aovs)).max(1);
+        let sampling = Sampling::new(&self.camera, &self.grid, self.supersample);
+        let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
+        let columns = self.columns(aovs);
+        let pass = SurfacePass {
+            tracer: self.tracer(),
+            camera: &self.camera,
+            sampling: &sampling,
+            visibility: &visibility,
+            shading: &self.shading,
+        };
+        let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
+            let mut buffer = pass.layers(layers, columns, progress)?;
+            if let Shading::Voxel(method) = self.shading {
+                occlude::occlude(self, method, &mut buffer, progress)?;
+            }
+            Ok(buffer)
+        };
+        let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
+        for first in (0..depth).step_by(thickness) {
+            let buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+            let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
+            let arrays = aovs.iter().map(|aov| aov.array(&buffer)).collect();
+            sink(Slab { layers: buffer.layers(), arrays, seen })?;
+        }
+        Ok(())
+    }
+
+    /// The whole picture in memory.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::render`].
+    pub fn volume(&self, aovs: &[Aov], progress: &dyn Progress) -> Result<Volume, Error> {
+        let mut arrays: Vec<Array> = Vec::new();
+        self.render(aovs, Some(self.grid.dimensions[2]), progress, |slab| {
+            arrays = slab.arrays;
+            Ok::<(), Error>(())
+        })?;
+        Ok(Volume { grid: self.grid, arrays, field_data: Vec::new() })
+    }
+
+    /// The columns that arrays and filters need.
+    fn columns(&self, aovs: &[Aov]) -> Columns {
+        columns(&self.shading, aovs) | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns())
+    }
+
+    /// Layers of a slab whose working set stays below `bytes`; at least one.
+    fn layers_within(&self, bytes: usize, aovs: &[Aov]) -> usize {
+        let voxel = self.bytes_per_voxel(aovs);
+        let halo = filters::halo(&self.filters);
+        (bytes / voxel / self.grid.layer_len().max(1)).saturating_sub(halo).clamp(1, self.grid.dimensions[2])
+    }
+
+    /// Bytes that a voxel takes while its slab is made.
+    fn bytes_per_voxel(&self, aovs: &[Aov]) -> usize {
+        bytes_per_voxel::<D>(self.columns(aovs), self.supersample, aovs)
+    }
+}
+
+/// The columns that arrays need, with this shading.
+fn columns(shading: &Shading, aovs: &[Aov]) -> Columns {
+    let point = if matches!(shading, Shading::Voxel(_)) { occlude::COLUMNS } else { Columns::SIMPLEX };
+    aovs.iter().fold(point, |all, aov| all | aov.columns())
+}
+
+/// Bytes that a voxel takes in the G-buffer, in arrays, and while its samples are looked at.
+fn bytes_per_voxel<const D: usize>(columns: Columns, supersample: usize, aovs: &[Aov]) -> usize {
+    let samples = supersample.pow(D as u32 - 1) * size_of::<u32>();
+    samples + columns.bytes::<D>() + aovs.iter().map(|aov| aov.bytes::<D>()).sum::<usize>()
+}

@@ -1,0 +1,211 @@
+//! The surface pass: from the simplices that samples see to the columns of the G-buffer.
+//!
+//! What a column needs is computed only if it was asked for. Where a voxel's samples see several simplices, each of them
+//! is looked at once, where the mean of its samples is, and counts by their number.
+//!
+//! Sums are taken in `f64`, in which the values of one simplex lose nothing: a voxel that sees one simplex has just the
+//! value at its centre.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::gbuffer::{Columns, GBuffer, RowMut};
+use super::samples::{Group, Sampling};
+use super::{Camera, Shading, Visibility};
+use crate::accel::Tracer;
+use crate::geometry::{Cone, Crossing, Ray, Vector, Vector64, narrow, normal_of, widen};
+use crate::mesh::normals::unit;
+use crate::occlusion::Error;
+use crate::progress::Progress;
+
+/// What turns hits into columns.
+pub(super) struct SurfacePass<'r, const D: usize> {
+    pub tracer: &'r Tracer<D>,
+    pub camera: &'r Camera<D>,
+    pub sampling: &'r Sampling,
+    pub visibility: &'r Visibility<D>,
+    pub shading: &'r Shading,
+}
+
+/// Where a ray meets a simplex.
+struct Hit<const D: usize> {
+    simplex: u32,
+    ray: Ray<D>,
+    crossing: Crossing<D>,
+}
+
+/// What is left from voxel to voxel of a row.
+struct Scratch<const D: usize> {
+    groups: Vec<Group>,
+    /// The cone that was asked for last: in perspective that of the voxel before will mostly do.
+    cone: Option<(u32, Vector<D>, Cone<D>)>,
+}
+
+impl<const D: usize> Scratch<D> {
+    fn cone(&mut self, tracer: &Tracer<D>, simplex: u32, origin: &Vector<D>) -> &Cone<D> {
+        let kept = self.cone.take().filter(|(s, o, _)| *s == simplex && o == origin);
+        let cone = || (simplex, *origin, Cone::of_simplex(origin, &tracer.mesh().corners(simplex)));
+        &self.cone.insert(kept.unwrap_or_else(cone)).2
+    }
+}
+
+/// Means over a voxel's samples, weighted by their number.
+#[derive(Default)]
+struct Means {
+    samples: f64,
+    depth: f64,
+    occlusion: f64,
+    error: f64,
+    albedo: [f64; 3],
+    lit: [f64; 3],
+}
+
+impl<const D: usize> SurfacePass<'_, D> {
+    /// Some layers of the image, with their occlusion where it comes from vertices.
+    ///
+    /// # Errors
+    /// Those of [`Visibility::first_hits`].
+    pub fn layers(&self, layers: Range<usize>, columns: Columns, progress: &dyn Progress) -> Result<GBuffer<D>, Error> {
+        let dimensions = self.sampling.grid.dimensions;
+        let found = self.sampling.first_hits(self.visibility, &layers, progress)?;
+        let mut buffer = GBuffer::new(dimensions, layers.clone(), columns);
+        let [width, height, _] = dimensions;
+        buffer.rows_mut().par_iter_mut().enumerate().try_for_each(|(row, out)| {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let (j, layer) = (row % height, row / height);
+            let mut scratch = Scratch { groups: Vec::new(), cone: None };
+            for i in 0..width {
+                if let Some((sample, simplex)) = self.sampling.groups(&found, [i, j, layer], &mut scratch.groups) {
+                    self.voxel([i, j, layers.start + layer], sample, simplex, &mut scratch, out);
+                }
+            }
+            progress.advance(width as u64);
+            Ok(())
+        })?;
+        Ok(buffer)
+    }
+
+    /// Fills in one voxel, whose groups are in `scratch` and whose point is what `sample` sees of `simplex`.
+    #[inline]
+    fn voxel(&self, index: [usize; 3], sample: usize, simplex: u32, scratch: &mut Scratch<D>, out: &mut RowMut<D>) {
+        let i = index[0];
+        let mesh = self.tracer.mesh();
+        let corners = mesh.corners(simplex).map(|v| widen(&v));
+        let seen: usize = scratch.groups.iter().map(|group| group.count).sum();
+        set(out.simplex, i, || simplex);
+        set(out.object, i, || mesh.object_of(simplex) as u16 + 1);
+        set(out.coverage, i, || seen as f32 / self.sampling.count() as f32);
+        if out.has_means() {
+            self.means(index, scratch).set(i, out);
+        }
+        if !out.has_point() {
+            return;
+        }
+        let ray = self.sampling.ray(self.camera, index, sample);
+        set(out.normal, i, || facing(normal_of(&corners), &ray));
+        let weights = scratch.cone(self.tracer, simplex, &ray.origin).crossing(&ray.direction).barycentric;
+        let vertices = mesh.simplices[simplex as usize];
+        set(out.barycentric, i, || weights.map(|w| w as f32));
+        set(out.position, i, || narrow(&(0..D).fold(Vector64::zeros(), |p, c| p + corners[c] * weights[c])));
+        set(out.shading_normal, i, || {
+            let normal = |c: usize| widen(&mesh.normals[vertices[c] as usize]);
+            facing((0..D).fold(Vector64::zeros(), |n, c| n + normal(c) * weights[c]), &ray)
+        });
+    }
+
+    /// The means over a voxel's groups.
+    fn means(&self, index: [usize; 3], scratch: &mut Scratch<D>) -> Means {
+        let mesh = self.tracer.mesh();
+        let mut means = Means::default();
+        for g in 0..scratch.groups.len() {
+            let group = scratch.groups[g];
+            let ray = self.sampling.mean_ray(self.camera, index, &group);
+            let crossing = scratch.cone(self.tracer, group.simplex, &ray.origin).crossing(&ray.direction);
+            let hit = Hit { simplex: group.simplex, ray, crossing };
+            let (occlusion, error) = self.shaded(&hit);
+            let (weight, occlusion) = (group.count as f64, f64::from(occlusion));
+            means.samples += weight;
+            means.depth += weight * hit.depth();
+            means.occlusion += weight * occlusion;
+            means.error += weight * f64::from(error);
+            for (c, color) in mesh.objects[mesh.object_of(group.simplex)].color.into_iter().enumerate() {
+                means.albedo[c] += weight * f64::from(color);
+                means.lit[c] += weight * f64::from(color) * occlusion;
+            }
+        }
+        means
+    }
+
+    /// Occlusion and its standard error by the values at the simplex's vertices; open where there are none.
+    #[inline]
+    fn shaded(&self, hit: &Hit<D>) -> (f32, f32) {
+        let vertices = self.tracer.mesh().simplices[hit.simplex as usize];
+        let corner = |values: &[f32], i: usize| values.get(vertices[i] as usize).map_or(f64::NAN, |&v| f64::from(v));
+        let equal = [1.0 / D as f64; D];
+        let (estimates, weights) = match self.shading {
+            Shading::Flat(estimates) => (estimates, &equal),
+            Shading::Smooth(estimates) => (estimates, &hit.crossing.barycentric),
+            Shading::None | Shading::Voxel(_) => return (1.0, 0.0),
+        };
+        let value = match self.shading {
+            Shading::Flat(_) => (0..D).map(|i| corner(&estimates.values, i)).sum::<f64>() / D as f64,
+            _ => (0..D).map(|i| corner(&estimates.values, i) * weights[i]).sum::<f64>(),
+        };
+        // The vertices' errors are independent.
+        let variance: f64 = (0..D).map(|i| (corner(&estimates.errors, i) * weights[i]).powi(2)).sum();
+        ((value as f32).clamp(0.0, 1.0), variance.sqrt() as f32)
+    }
+}
+
+impl<const D: usize> Hit<D> {
+    /// Distance from the eye.
+    fn depth(&self) -> f64 {
+        self.crossing.t * widen(&self.ray.direction).norm()
+    }
+}
+
+impl<const D: usize> RowMut<'_, D> {
+    /// Whether it has columns that belong to the voxel's point.
+    fn has_point(&self) -> bool {
+        !(self.normal.is_empty()
+            && self.barycentric.is_empty()
+            && self.position.is_empty()
+            && self.shading_normal.is_empty())
+    }
+
+    /// Whether it has columns that are means over a voxel's samples.
+    fn has_means(&self) -> bool {
+        !(self.depth.is_empty() && self.occlusion.is_empty() && self.error.is_empty() && self.albedo.is_empty())
+    }
+}
+
+impl Means {
+    fn set<const D: usize>(&self, i: usize, out: &mut RowMut<D>) {
+        let mean = |sum: f64| (sum / self.samples) as f32;
+        set(out.depth, i, || mean(self.depth));
+        set(out.occlusion, i, || mean(self.occlusion));
+        set(out.error, i, || mean(self.error));
+        // Weighted by occlusion, unless all is dark.
+        let albedo =
+            |c: usize| if self.occlusion > 0.0 { (self.lit[c] / self.occlusion) as f32 } else { mean(self.albedo[c]) };
+        set(out.albedo, i, || [0, 1, 2].map(albedo));
+    }
+}
+
+/// Sets a column's voxel, if there is such a column.
+#[inline]
+fn set<T>(column: &mut [T], i: usize, value: impl FnOnce() -> T) {
+    if let Some(place) = column.get_mut(i) {
+        *place = value();
+    }
+}
+
+/// A normal at length 1, on the side that the ray comes from.
+#[inline]
+fn facing<const D: usize>(normal: Vector64<D>, ray: &Ray<D>) -> Vector<D> {
+    let towards = normal.dot(&widen(&ray.direction)) > 0.0;
+    unit(&if towards { -normal } else { normal })
+}

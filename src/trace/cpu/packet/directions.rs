@@ -1,0 +1,372 @@
+//! The rays of one shading point, 64 at a time.
+//!
+//! These are the directions of [`Sequence::next_direction`], bit for bit: the same operations in the same order, without
+//! branches, so that the compiler works on several directions at once. Their order within a block differs, which a count
+//! does not notice. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
+//! taken in ascending order, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
+
+use super::lanes::Lanes;
+use crate::accel::WIDTH;
+use crate::geometry::{Frame, Vector};
+use crate::trace::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, scramble_reversed, sobol};
+
+/// Rays of a block; the bits of a `u64` name them.
+pub(super) const BLOCK: usize = 64;
+
+/// Groups of rays as wide as the lanes.
+pub(super) const GROUPS: usize = BLOCK / WIDTH;
+
+/// A cone that holds the directions of a group: its axis, and the cosine and sine of its half-angle, at most a right angle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GroupCone<const D: usize> {
+    pub axis: [f32; D],
+    pub cosine: f32,
+    pub sine: f32,
+}
+
+/// The first Sobol' points, each coordinate with its bits reversed.
+static SOBOL_BLOCK: [[u32; BLOCK]; 3] = sobol_block();
+
+const fn sobol_block() -> [[u32; BLOCK]; 3] {
+    let mut table = [[0; BLOCK]; 3];
+    let mut dimension = 0;
+    while dimension < 3 {
+        let mut index = 0;
+        while index < BLOCK {
+            table[dimension][index] = sobol(index as u32, dimension).reverse_bits();
+            index += 1;
+        }
+        dimension += 1;
+    }
+    table
+}
+
+/// A block of rays from one point, each number of a ray in an array of its own.
+#[derive(Debug)]
+#[repr(C, align(64))]
+pub(super) struct Rays<const D: usize> {
+    /// Directions in the coordinates of the scene, as [`crate::geometry::Ray`] keeps them.
+    pub direction: [[f32; BLOCK]; D],
+    /// One over each component, which is taken for 1e-12 if it is smaller: over the extent of a scene that moves a ray
+    /// by less than boxes are grown by.
+    pub inverse: [[f32; BLOCK]; D],
+    /// The size of `inverse`.
+    pub absolute: [[f32; BLOCK]; D],
+    /// The origin, in the coordinates of the boxes, times `inverse`.
+    pub offset: [[f32; BLOCK]; D],
+    /// The cosine to the normal.
+    pub height: [f32; BLOCK],
+    /// The place of each ray in the sequence, counted from the block's first: of Sobol' points of a whole block, in the
+    /// order of their indices, which keeps aligned runs of 2^k rays together.
+    pub number: [u8; BLOCK],
+    /// Around the directions of each group.
+    pub cones: [GroupCone<D>; GROUPS],
+}
+
+impl<const D: usize> Rays<D> {
+    pub fn new() -> Self {
+        Self {
+            direction: [[0.0; BLOCK]; D],
+            inverse: [[0.0; BLOCK]; D],
+            absolute: [[0.0; BLOCK]; D],
+            offset: [[0.0; BLOCK]; D],
+            height: [0.0; BLOCK],
+            number: [0; BLOCK],
+            cones: [GroupCone { axis: [0.0; D], cosine: 0.0, sine: 1.0 }; GROUPS],
+        }
+    }
+
+    /// Takes the next `count` directions of the sequence; it must have given whole blocks so far.
+    #[inline(always)]
+    pub fn take(&mut self, sequence: &mut Sequence, frame: &Frame<D>, count: usize) {
+        let mut points = [[0.0f32; BLOCK]; 3];
+        match &mut sequence.source {
+            Source::Random(_) => {
+                for i in 0..count {
+                    let point: [f32; 3] = if D == 4 {
+                        sequence.next_point()
+                    } else {
+                        let [a, b] = sequence.next_point();
+                        [a, b, 0.0]
+                    };
+                    (0..3).for_each(|d| points[d][i] = point[d]);
+                }
+            }
+            Source::Sobol(keys) => {
+                let base = scramble(sequence.next, keys[3]) & !(BLOCK as u32 - 1);
+                for d in 0..D - 1 {
+                    let constant = sobol(base, d).reverse_bits();
+                    if count == BLOCK {
+                        for i in 0..BLOCK {
+                            let bits = scramble_reversed(SOBOL_BLOCK[d][i] ^ constant, keys[d]).reverse_bits();
+                            points[d][i] = unit(bits);
+                        }
+                    } else {
+                        for i in 0..count {
+                            let place = scramble(sequence.next.wrapping_add(i as u32), keys[3]) as usize % BLOCK;
+                            let bits = scramble_reversed(SOBOL_BLOCK[d][place] ^ constant, keys[d]).reverse_bits();
+                            points[d][i] = unit(bits);
+                        }
+                    }
+                }
+                sequence.next = sequence.next.wrapping_add(count as u32);
+            }
+        }
+        let points = in_order::<D>(&points, count, &mut self.number);
+        self.lift(&points, frame);
+    }
+
+    /// Points of the cube onto the ball, onto the hemisphere, into the frame.
+    #[inline(always)]
+    fn lift(&mut self, points: &[[f32; BLOCK]; 3], frame: &Frame<D>) {
+        let (axis, factor, turned) = frame.parts();
+        let sign = if turned { -1.0f32 } else { 1.0 };
+        for i in 0..BLOCK {
+            let mut local = [0.0f32; D];
+            let (a, b, c) = (points[0][i], points[1][i], points[2][i]);
+            let [x, y] = square_to_disk(a, b);
+            if D == 4 {
+                local[..3].copy_from_slice(&disk_to_ball(a, b, c, x, y));
+            } else {
+                (local[0], local[1]) = (x, y);
+            }
+            let mut square = 0.0f32;
+            for l in &local[..D - 1] {
+                square += l * l;
+            }
+            let rest = 1.0 - square;
+            local[D - 1] = (if rest > LOWEST_SQUARED_COSINE { rest } else { LOWEST_SQUARED_COSINE }).sqrt();
+            self.height[i] = local[D - 1];
+            let mut product = 0.0f32;
+            for k in 0..D {
+                product += axis[k] * local[k];
+            }
+            let scale = factor * product;
+            for k in 0..D {
+                self.direction[k][i] = (local[k] - scale * axis[k]) * sign;
+            }
+        }
+    }
+
+    /// Uses these directions, none longer than 1: bounds on rounding and the cones around groups rely on that.
+    pub fn set(&mut self, directions: &[Vector<D>]) {
+        debug_assert!(directions.iter().all(|d| d.norm_squared() < 1.0 + 1e-5));
+        for (i, direction) in directions.iter().enumerate().take(BLOCK) {
+            (0..D).for_each(|k| self.direction[k][i] = direction[k]);
+            self.height[i] = 0.0;
+            self.number[i] = i as u8;
+        }
+    }
+
+    /// The bits of a set of rays by their place in the sequence.
+    pub fn in_sequence(&self, set: u64) -> u64 {
+        (0..BLOCK).fold(0, |word, i| word | (set >> i & 1) << (self.number[i] % BLOCK as u8))
+    }
+
+    /// Completes the directions by what box tests need. `origin` is in the coordinates of the boxes.
+    #[inline(always)]
+    pub fn start_from(&mut self, origin: &Vector<D>) {
+        for k in 0..D {
+            for i in 0..BLOCK {
+                let x = self.direction[k][i];
+                let x = if x.abs() < 1e-30 { 0.0 } else { x };
+                let size = if x.abs() > 1e-12 { x.abs() } else { 1e-12 };
+                let inverse = 1.0 / size.copysign(x);
+                self.direction[k][i] = x;
+                self.inverse[k][i] = inverse;
+                self.absolute[k][i] = inverse.abs();
+                self.offset[k][i] = origin[k] * inverse;
+            }
+        }
+        self.enclose();
+    }
+
+    /// The rays whose cosine to the normal is at most this.
+    #[inline(always)]
+    pub fn up_to_height<L: Lanes>(&self, height: f32) -> u64 {
+        let mut mask = 0;
+        for (n, row) in self.height.as_chunks::<WIDTH>().0.iter().enumerate() {
+            mask |= u64::from(L::load(row).less_or_equal(L::splat(height))) << (n * WIDTH);
+        }
+        mask
+    }
+
+    /// Finds the cones around the directions of the groups. Directions beyond `count` are left from before, and may be
+    /// zero; they only make a cone wider than it need be.
+    #[inline(always)]
+    fn enclose(&mut self) {
+        for group in 0..GROUPS {
+            let mut axis = [0.0f32; D];
+            let mut square = 0.0f32;
+            for k in 0..D {
+                for x in &self.direction[k].as_chunks::<WIDTH>().0[group] {
+                    axis[k] += x;
+                }
+                square += axis[k] * axis[k];
+            }
+            let factor = 1.0 / square.max(1e-10).sqrt();
+            let mut along = [0.0f32; WIDTH];
+            for k in 0..D {
+                axis[k] *= factor;
+                let row = &self.direction[k].as_chunks::<WIDTH>().0[group];
+                for i in 0..WIDTH {
+                    along[i] += axis[k] * row[i];
+                }
+            }
+            let mut cosine = 1.0f32;
+            for x in along {
+                cosine = if x < cosine { x } else { cosine };
+            }
+            // Rounding of products of unit vectors, and more. A cone wider than a half-space is all of space.
+            let cosine = cosine - 1e-5;
+            let sine = (1.0 - cosine * cosine).max(0.0).sqrt() + 1e-5;
+            self.cones[group] = if cosine > 0.0 {
+                GroupCone { axis, cosine, sine }
+            } else {
+                GroupCone { axis: [0.0; D], cosine: -1.0, sine: 1.0 }
+            };
+        }
+    }
+
+    /// The directions of a group.
+    #[inline(always)]
+    pub fn directions<L: Lanes>(&self, group: usize) -> [L; D] {
+        let mut directions = [L::splat(0.0); D];
+        for k in 0..D {
+            directions[k] = L::load(&self.direction[k].as_chunks().0[group]);
+        }
+        directions
+    }
+
+    /// The direction of a ray, in all lanes.
+    #[inline(always)]
+    pub fn splat<L: Lanes>(&self, i: usize) -> [L; D] {
+        let mut direction = [L::splat(0.0); D];
+        for k in 0..D {
+            direction[k] = L::splat(self.direction[k][i]);
+        }
+        direction
+    }
+}
+
+/// The points cell by cell of a grid of 64 cells along Morton's curve, so that neighbours in a block go to the same
+/// parts of the scene.
+#[inline(always)]
+fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize, number: &mut [u8; BLOCK]) -> [[f32; BLOCK]; 3] {
+    // Bits of the cells along an axis, spread apart to be joined.
+    const SPREAD_2: [u8; 8] = [0, 1, 4, 5, 16, 17, 20, 21];
+    const SPREAD_3: [u8; 4] = [0, 1, 8, 9];
+    let cell = |x: f32, cells: f32| ((x + 1.0) * (cells * 0.5)) as i32 as usize;
+    let mut keys = [0u8; BLOCK];
+    for i in 0..BLOCK {
+        keys[i] = if D == 4 {
+            let spread = |x: f32| SPREAD_3[cell(x, 4.0) % 4];
+            spread(points[0][i]) | spread(points[1][i]) << 1 | spread(points[2][i]) << 2
+        } else {
+            let spread = |x: f32| SPREAD_2[cell(x, 8.0) % 8];
+            spread(points[0][i]) | spread(points[1][i]) << 1
+        };
+    }
+    let mut ends = [0u8; BLOCK];
+    for &key in &keys[..count] {
+        ends[key as usize % BLOCK] += 1;
+    }
+    let mut sum = 0;
+    for end in &mut ends {
+        sum += *end;
+        *end = sum;
+    }
+    let mut ordered = [[0.0; BLOCK]; 3];
+    for (i, &key) in keys[..count].iter().enumerate() {
+        let end = &mut ends[key as usize % BLOCK];
+        *end -= 1;
+        let place = *end as usize % BLOCK;
+        number[place] = i as u8;
+        for d in 0..D - 1 {
+            ordered[d][place] = points[d][i];
+        }
+    }
+    ordered
+}
+
+/// As [`Sequence::next_point`] makes a coordinate of bits; 24 of them fit a signed number.
+#[inline(always)]
+fn unit(bits: u32) -> f32 {
+    ((bits >> 8) as i32 as f32 + 0.5) * (1.0 / (1 << 23) as f32) - 1.0
+}
+
+/// [`crate::trace::square_to_disk`] without branches.
+#[inline(always)]
+fn square_to_disk(a: f32, b: f32) -> [f32; 2] {
+    let first = a.abs() > b.abs();
+    let (large, small) = if first { (a, b) } else { (b, a) };
+    // 0 / 0 at the centre.
+    let ratio = if large == 0.0 { 0.0 } else { small / large };
+    let y = ratio * std::f32::consts::FRAC_PI_4;
+    let z = y * y;
+    let sin = y * (1.0 + z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * (-1.0 / 5040.0 + z * (1.0 / 362_880.0)))));
+    let cos = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z * (1.0 / 40_320.0))));
+    let (u, v) = (large * cos, large * sin);
+    if first { [u, v] } else { [v, u] }
+}
+
+/// The rest of [`crate::trace::cube_to_ball`], without branches: (x, y) is where the disk's map takes (a, b).
+#[inline(always)]
+fn disk_to_ball(a: f32, b: f32, c: f32, x: f32, y: f32) -> [f32; 3] {
+    let larger = |p: f32, q: f32| if p > q { p } else { q };
+    let radius = larger(a.abs(), b.abs());
+    let shell = larger(radius, c.abs());
+    let divisor = if shell == 0.0 { 1.0 } else { shell };
+    let r = radius / divisor;
+    let cap = (1.0 - r * r * (1.0 / 3.0)).copysign(c);
+    let wall = c / divisor * (2.0 / 3.0);
+    let cos = if c.abs() >= radius { cap } else { wall };
+    let square = larger(1.0 - cos * cos, 0.0);
+    let across = shell * square.sqrt() / if radius == 0.0 { 1.0 } else { radius };
+    let across = if radius == 0.0 { 0.0 } else { across };
+    [x * across, y * across, shell * cos]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Ray;
+    use crate::trace::Sampler;
+
+    fn same_bits<const D: usize>() {
+        for (point, sampler) in (0..300).flat_map(|point| [(point, Sampler::Sobol), (point, Sampler::Random)]) {
+            let normal = Vector::<D>::from_fn(|r, _| ((point * 7 + r as u64 * 13) % 11) as f32 - 4.9).normalize();
+            let frame = Frame::new(&normal);
+            let (mut slow, mut fast) = (Sequence::new(sampler, 9, point), Sequence::new(sampler, 9, point));
+            let mut rays = Rays::<D>::new();
+            for count in [64, 64, 64, (point % 64) as usize + 1] {
+                let key = |d: &Vector<D>| d.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+                let expected = (0..count).map(|_| Ray::new(Vector::zeros(), slow.next_direction(&frame)).direction);
+                let mut expected: Vec<_> = expected.map(|d| key(&d)).collect();
+                rays.take(&mut fast, &frame, count);
+                rays.start_from(&Vector::zeros());
+                let mut found: Vec<_> =
+                    (0..count).map(|i| key(&Vector::from_fn(|k, _| rays.direction[k][i]))).collect();
+                expected.sort();
+                found.sort();
+                assert_eq!(found, expected, "{sampler:?} {point}");
+            }
+        }
+    }
+
+    #[test]
+    fn directions_are_those_of_the_sequence() {
+        same_bits::<3>();
+        same_bits::<4>();
+    }
+
+    #[test]
+    fn maps_without_branches_are_the_maps() {
+        let values = [-1.0 + 1e-7, -0.7, -0.5, -1e-7, 0.0, 6e-8, 0.3, 0.5, 0.7, 0.999];
+        for (a, b, c) in values.iter().flat_map(|&a| values.iter().flat_map(move |&b| values.map(|c| (a, b, c)))) {
+            let [x, y] = square_to_disk(a, b);
+            assert_eq!([x, y], crate::trace::square_to_disk(a, b));
+            assert_eq!(disk_to_ball(a, b, c, x, y), crate::trace::cube_to_ball(a, b, c));
+        }
+    }
+}

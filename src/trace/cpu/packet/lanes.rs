@@ -1,0 +1,156 @@
+//! Eight `f32` side by side, and the few operations the packet tracer needs on them.
+//!
+//! The engine is written once against the trait [`Lanes`] and compiled for each [`super::Level`] of instructions; which one
+//! runs is chosen at run time. Levels may round differently (one fuses multiplications into additions, another
+//! doesn't), as every value computed here is only a filter whose rounding is bounded: what the filter can't decide goes
+//! to exact arithmetic. So all levels give the same results.
+
+use crate::accel::WIDTH;
+
+/// One row of lanes in memory: a number for each simplex of a leaf, or for each child of a node.
+pub(super) type Row = [f32; WIDTH];
+
+/// Eight numbers. Code that is generic over them must be inlined into the function compiled for the level, so it uses plain
+/// loops: a closure handed to an iterator is compiled apart, without the level's instructions. A mask has the bit of each lane, lane 0 lowest.
+pub(super) trait Lanes: Copy {
+    fn load(row: &Row) -> Self;
+    fn store(self, row: &mut Row);
+    fn splat(x: f32) -> Self;
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    /// `self * factor + term`, rounded once or twice.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// `self * factor - term`, rounded once or twice.
+    fn mul_sub(self, factor: Self, term: Self) -> Self;
+    /// `term - self * factor`, rounded once or twice.
+    fn negated_mul_add(self, factor: Self, term: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    fn square_root(self) -> Self;
+    /// Each lane with its sign turned where `sign` is negative.
+    fn turned_by(self, sign: Self) -> Self;
+    /// The lanes of `negative` where the sign bit of `self` is set, of `other` where it isn't.
+    fn select(self, negative: Self, other: Self) -> Self;
+    /// Lanes with the sign bit set.
+    fn negative(self) -> u8;
+    fn less_or_equal(self, other: Self) -> u8;
+    /// Writes those of the eight words that the mask names, each with `tag` in its low bits, side by side to the front
+    /// of `out`; what follows them there is overwritten too. Returns how many.
+    fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize;
+    /// Starts to bring an item into the cache.
+    #[inline(always)]
+    fn fetch<T>(_items: &[T], _index: u32) {}
+}
+
+/// Plain arrays.
+#[derive(Clone, Copy)]
+pub(super) struct Portable([f32; WIDTH]);
+
+impl Portable {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+}
+
+impl Lanes for Portable {
+    #[inline(always)]
+    fn load(row: &Row) -> Self {
+        Self(*row)
+    }
+
+    #[inline(always)]
+    fn store(self, row: &mut Row) {
+        *row = self.0;
+    }
+
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        Self([x; WIDTH])
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self.mul(factor).add(term)
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, term: Self) -> Self {
+        self.mul(factor).sub(term)
+    }
+
+    #[inline(always)]
+    fn negated_mul_add(self, factor: Self, term: Self) -> Self {
+        term.sub(self.mul(factor))
+    }
+
+    // Comparisons, not `f32::min`: there are no NaNs to mind, and this is one instruction.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f32::abs))
+    }
+
+    #[inline(always)]
+    fn square_root(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
+    fn turned_by(self, sign: Self) -> Self {
+        self.zip(sign, |a, s| f32::from_bits(a.to_bits() ^ (s.to_bits() & (1 << 31))))
+    }
+
+    #[inline(always)]
+    fn select(self, negative: Self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| if self.0[i].is_sign_negative() { negative.0[i] } else { other.0[i] }))
+    }
+
+    #[inline(always)]
+    fn negative(self) -> u8 {
+        (0..WIDTH).fold(0, |mask, i| mask | (((self.0[i].to_bits() >> 31) as u8) << i))
+    }
+
+    #[inline(always)]
+    fn less_or_equal(self, other: Self) -> u8 {
+        (0..WIDTH).fold(0, |mask, i| mask | (u8::from(self.0[i] <= other.0[i]) << i))
+    }
+
+    #[inline(always)]
+    fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize {
+        let mut count = 0;
+        let mut rest = mask;
+        while rest != 0 {
+            out[count] = words[rest.trailing_zeros() as usize] | tag;
+            rest &= rest - 1;
+            count += 1;
+        }
+        count
+    }
+}

@@ -1,0 +1,29 @@
+//! All rays of a shading point as packets, at full speed.
+//!
+//! What a ray hits is defined by exact signs ([`crate::geometry::Cone`]); the slow way to ask is
+//! [`super::estimate_at`], ray by ray. This engine gives the same values, bit for bit, by filters in `f32`, eight
+//! lanes wide, whose rounding is bounded; what they can't decide goes to the exact cone.
+//!
+//! - [`level`]: the instructions that a processor may have;
+//! - [`lanes`], `x86`: eight numbers side by side, for each level;
+//! - [`directions`]: the rays of a shading point, 64 at a time;
+//! - [`star`]: what the simplices around a vertex hide;
+//! - [`traverse`]: the rays through the [`crate::accel::WideBvh`];
+//! - [`leaves`]: the rays against the simplices of a leaf;
+//! - [`cones`]: eight simplices as cones seen from the shading point;
+//! - [`tracer`]: all of this, point after point.
+
+mod cones;
+mod directions;
+mod lanes;
+mod leaves;
+mod level;
+mod query;
+mod star;
+mod tracer;
+mod traverse;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+pub use level::Level;
+pub use tracer::PacketTracer;

@@ -1,0 +1,218 @@
+//! The tracer itself: point after point, 64 rays at a time.
+
+use super::directions::{BLOCK, Rays};
+use super::lanes::{Lanes, Portable};
+use super::level::Level;
+#[cfg(target_arch = "x86_64")]
+use super::level::{with_avx2, with_avx512};
+use super::query::Query;
+use super::star::VertexStar;
+use super::traverse::Traversal;
+#[cfg(target_arch = "x86_64")]
+use super::x86::{Avx2, Avx512};
+use crate::accel::Tracer;
+use crate::geometry::{Frame, Ray, Vector};
+use crate::progress::{Cancelled, Progress, Silent};
+use crate::trace::cpu::scalar::estimate_at;
+use crate::trace::estimate::{Accumulator, Estimate};
+use crate::trace::{Sampler, Sampling, Sequence, ShadingPoint, Target};
+
+/// Blocks of rays between two looks at whether to go on: a few milliseconds.
+const BLOCKS_BETWEEN_LOOKS: usize = 64;
+
+/// The working memory of one thread: 0.2 MB, to be used for many points.
+#[derive(Debug)]
+pub struct PacketTracer<const D: usize> {
+    level: Level,
+    rays: Box<Rays<D>>,
+    star: VertexStar<D>,
+    traversal: Traversal<D>,
+}
+
+/// Rays to be traced from one point.
+enum Source<'a, const D: usize> {
+    Sequence { sequence: Sequence, frame: Frame<D>, samples: u32, target: Option<Target> },
+    Directions(&'a [Vector<D>]),
+}
+
+/// The vertex that the rays start from, if they do.
+struct AtVertex<'a, const D: usize> {
+    normal: Vector<D>,
+    identity: u32,
+    /// The simplices that have it as a corner.
+    around: &'a [u32],
+}
+
+/// All that is asked at once.
+struct Job<'a, const D: usize> {
+    query: Query<'a, D>,
+    vertex: Option<AtVertex<'a, D>>,
+    source: Source<'a, D>,
+    progress: &'a dyn Progress,
+}
+
+impl<const D: usize> Default for PacketTracer<D> {
+    fn default() -> Self {
+        Self::new(Level::best())
+    }
+}
+
+impl<const D: usize> PacketTracer<D> {
+    /// Working memory for the instructions of a level.
+    ///
+    /// # Panics
+    /// If this processor lacks them.
+    pub fn new(level: Level) -> Self {
+        assert!(Level::available().contains(&level), "this processor lacks {level:?}");
+        Self { level, rays: Box::new(Rays::new()), star: VertexStar::new(), traversal: Traversal::new() }
+    }
+
+    /// The value at a point and its error, as [`estimate_at`] gives them.
+    ///
+    /// # Errors
+    /// [`Cancelled`] if `progress` says so.
+    pub fn estimate(
+        &mut self,
+        tracer: &Tracer<D>,
+        point: &ShadingPoint<D>,
+        sampling: &Sampling,
+        progress: &dyn Progress,
+    ) -> Result<Estimate, Cancelled> {
+        let mesh = tracer.mesh();
+        let (position, normal) = (point.position(mesh), point.normal(mesh));
+        if normal.amax() == 0.0 {
+            return Ok(Estimate::known(1.0));
+        }
+        if !tracer.wide().serves(&position) {
+            return estimate_at(tracer, point, sampling, progress);
+        }
+        let vertex = match *point {
+            ShadingPoint::Vertex(vertex) => {
+                let identity = mesh.identity[vertex as usize];
+                Some(AtVertex { normal, identity, around: tracer.incidence().around(identity) })
+            }
+            ShadingPoint::Inside { .. } => None,
+        };
+        let query = Query::new(tracer, position, normal, sampling.max_distance, point.ignored());
+        let source = Source::Sequence {
+            sequence: Sequence::new(sampling.sampler, sampling.seed, point.number()),
+            frame: Frame::new(&normal),
+            samples: sampling.samples,
+            target: sampling.target,
+        };
+        Ok(self.traced(Job { query, vertex, source, progress })?.estimate())
+    }
+
+    /// How many of the rays from a point in these directions, none longer than 1, hit a simplex other than `ignored`
+    /// within `limit`; as [`Tracer::occluded`] tells ray by ray. If the directions are those of a hemisphere, its
+    /// middle as `normal` saves work; else it may be zero.
+    pub fn count_occluded(
+        &mut self,
+        tracer: &Tracer<D>,
+        origin: &Vector<D>,
+        normal: Vector<D>,
+        directions: &[Vector<D>],
+        limit: f32,
+        ignored: Option<u32>,
+    ) -> u32 {
+        if !tracer.wide().serves(origin) {
+            let rays = directions.iter().map(|d| Ray::new(*origin, *d));
+            return rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
+        }
+        // Left out only if all rays surely are on its side.
+        let on_side = directions.iter().all(|d| d.dot(&normal) > 1e-5);
+        let normal = if on_side { normal } else { Vector::zeros() };
+        let query = Query::new(tracer, *origin, normal, limit, ignored);
+        let source = Source::Directions(directions);
+        // Nobody cancels.
+        let found = self.traced(Job { query, vertex: None, source, progress: &Silent });
+        found.map_or(0, |found| found.rays() - found.escaped())
+    }
+
+    /// Chooses the code compiled for the level.
+    fn traced(&mut self, job: Job<D>) -> Result<Accumulator, Cancelled> {
+        match self.level {
+            Level::Portable => traced::<Portable, D>(self, job),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `new` has checked that the processor has all features of the level, which are the very list that
+            // the function is compiled for.
+            Level::Avx2 => unsafe { traced_avx2(self, job) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Level::Avx512 => unsafe { traced_avx512(self, job) },
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => traced::<Portable, D>(self, job),
+        }
+    }
+}
+
+/// [`traced`] compiled for AVX2.
+#[cfg(target_arch = "x86_64")]
+macro_rules! compiled_for_avx2 {
+    ($($feature:tt)+) => {
+        #[target_feature($(enable = $feature),+)]
+        fn traced_avx2<const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
+            traced::<Avx2, D>(packets, job)
+        }
+    };
+}
+
+/// [`traced`] compiled for AVX-512.
+#[cfg(target_arch = "x86_64")]
+macro_rules! compiled_for_avx512 {
+    ($($feature:tt)+) => {
+        #[target_feature($(enable = $feature),+)]
+        fn traced_avx512<const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
+            traced::<Avx512, D>(packets, job)
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+with_avx2!(compiled_for_avx2);
+#[cfg(target_arch = "x86_64")]
+with_avx512!(compiled_for_avx512);
+
+/// Counts the rays that escape.
+#[inline(always)]
+fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
+    let Job { query, vertex, mut source, progress } = job;
+    let query = &query;
+    let around = match &vertex {
+        Some(at) => {
+            packets.star.set::<L>(query, at.normal, at.identity, at.around);
+            at.around
+        }
+        None => {
+            packets.star.clear();
+            &[]
+        }
+    };
+    let (total, sampler) = match &source {
+        Source::Sequence { samples, sequence, .. } => (*samples as usize, sequence.sampler()),
+        Source::Directions(directions) => (directions.len(), Sampler::Random),
+    };
+    let mut accumulator = Accumulator::new(sampler);
+    for (block, first) in (0..total).step_by(BLOCK).enumerate() {
+        if block % BLOCKS_BETWEEN_LOOKS == 0 && progress.cancelled() {
+            return Err(Cancelled);
+        }
+        let count = BLOCK.min(total - first);
+        match &mut source {
+            Source::Sequence { sequence, frame, .. } => packets.rays.take(sequence, frame, count),
+            Source::Directions(directions) => packets.rays.set(&directions[first..first + count]),
+        }
+        packets.rays.start_from(&query.centred);
+        let alive = u64::MAX >> (BLOCK - count);
+        let hidden = packets.star.hidden::<L>(query, &packets.rays, around, alive);
+        let hit = packets.traversal.blocked::<L>(query, &packets.rays, alive & !hidden);
+        let open = alive & !(hidden | hit);
+        accumulator.add(if accumulator.is_fine() { packets.rays.in_sequence(open) } else { open }, count as u32);
+        if let Source::Sequence { target: Some(target), .. } = &source
+            && target.is_met(&accumulator)
+        {
+            break;
+        }
+    }
+    Ok(accumulator)
+}

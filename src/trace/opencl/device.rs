@@ -1,0 +1,249 @@
+//! A device that is open: a context, a queue, and what is done with them, each call with its error in words.
+//!
+//! This is the only file that calls OpenCL. All transfers wait until they are done, so no buffer is dropped while
+//! the device still uses it.
+
+use std::ffi::c_void;
+use std::marker::PhantomData;
+use std::ptr;
+
+use bytemuck::Pod;
+use opencl3::command_queue::CommandQueue;
+use opencl3::context::Context;
+use opencl3::error_codes::ClError;
+use opencl3::kernel::Kernel;
+use opencl3::memory::{Buffer, CL_MEM_READ_ONLY, CL_MEM_WRITE_ONLY, ClMem};
+use opencl3::program::Program;
+use opencl3::types::{CL_TRUE, cl_device_id, cl_mem};
+
+use super::devices::Info;
+use super::error::{Error, explain};
+use super::program;
+
+/// Work-items of a group. Always the same, as some compilers make a kernel anew for each number.
+const GROUP: usize = 64;
+
+/// An open device.
+#[derive(Debug)]
+pub(super) struct Device {
+    pub info: Info,
+    queue: CommandQueue,
+    context: Context,
+}
+
+/// The kernels for one dimension and hierarchy.
+#[derive(Debug)]
+pub(super) struct Kernels {
+    pub layout: Kernel,
+    pub directions: Kernel,
+    pub occluded: Kernel,
+    pub first_hit: Kernel,
+}
+
+/// Memory of the device that holds values of a type.
+#[derive(Debug)]
+pub(super) struct Memory<T> {
+    buffer: Buffer<u8>,
+    /// How many values it has room for.
+    pub room: usize,
+    values: PhantomData<T>,
+}
+
+/// What the kernels do with memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// They read it.
+    Input,
+    /// They write it.
+    Output,
+}
+
+/// An argument of a kernel.
+pub(super) enum Argument<'a> {
+    Memory(cl_mem, PhantomData<&'a ()>),
+    U32(u32),
+    U64(u64),
+    F32(f32),
+}
+
+impl<T> Memory<T> {
+    /// As an argument, for as long as it is borrowed.
+    pub fn argument(&self) -> Argument<'_> {
+        Argument::Memory(self.buffer.get(), PhantomData)
+    }
+}
+
+impl Device {
+    pub fn open(info: Info) -> Result<Self, Error> {
+        let device = opencl3::device::Device::new(info.id as cl_device_id);
+        let failed = |action| {
+            let device = info.label();
+            move |error: ClError| Error::Call { device, action, reason: explain(&error) }
+        };
+        let context = Context::from_device(&device).map_err(failed("opening the device"))?;
+        #[allow(deprecated)] // The newer call needs OpenCL 2.
+        let queue = CommandQueue::create_default(&context, 0).map_err(failed("making a queue"))?;
+        Ok(Self { info, queue, context })
+    }
+
+    fn failed(&self, action: &'static str) -> impl FnOnce(ClError) -> Error + '_ {
+        move |error| Error::Call { device: self.info.label(), action, reason: explain(&error) }
+    }
+
+    /// Compiles the kernels, and sees that structs are what they should be.
+    pub fn build(&self, d: usize, depth: usize) -> Result<Kernels, Error> {
+        self.compile(&program::text(d, depth, self.info.double))
+    }
+
+    fn compile(&self, text: &str) -> Result<Kernels, Error> {
+        let options =
+            if self.info.rounded { "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt" } else { "-cl-std=CL1.2" };
+        let id = self.info.id as cl_device_id;
+        let mut program =
+            Program::create_from_source(&self.context, text).map_err(self.failed("handing over the kernels"))?;
+        let built = program.build(&[id], options);
+        let log = program.get_build_log(id).unwrap_or_default();
+        let refuse = |reason: String| Error::Build { device: self.info.label(), reason, log: log.trim().to_owned() };
+        built.map_err(|error| refuse(explain(&error)))?;
+        // Some compilers report success and leave kernels out.
+        let kernel = |name: &str| {
+            Kernel::create(&program, name).map_err(|error| refuse(format!("no kernel `{name}`, {}", explain(&error))))
+        };
+        let kernels = Kernels {
+            layout: kernel("layout")?,
+            directions: kernel("directions")?,
+            occluded: kernel("occluded")?,
+            first_hit: kernel("first_hit")?,
+        };
+        let expected = program::expected_layout();
+        let sizes = self.output::<u32>(expected.len(), "sizes of structs")?;
+        self.launch(&kernels.layout, &[sizes.argument()], 1)?;
+        let mut found = vec![0; expected.len()];
+        self.read(&sizes, &mut found)?;
+        if found != expected {
+            return Err(Error::Layout { device: self.info.label(), found, expected });
+        }
+        Ok(kernels)
+    }
+
+    /// Memory for so many results of a kernel, at least one.
+    pub fn output<T: Pod>(&self, room: usize, what: &'static str) -> Result<Memory<T>, Error> {
+        self.allocate(room, Role::Output, what)
+    }
+
+    /// Memory that holds these values for kernels to read.
+    pub fn input<T: Pod>(&self, values: &[T], what: &'static str) -> Result<Memory<T>, Error> {
+        let mut memory = self.allocate(values.len(), Role::Input, what)?;
+        self.write(&mut memory, values)?;
+        Ok(memory)
+    }
+
+    /// Memory with room for so many values, at least one.
+    fn allocate<T: Pod>(&self, room: usize, role: Role, what: &'static str) -> Result<Memory<T>, Error> {
+        let bytes = room.max(1) * size_of::<T>();
+        if self.info.largest > 0 && bytes as u64 > self.info.largest {
+            let (needed, limit) = (bytes as u64, self.info.largest);
+            return Err(Error::TooLarge { device: self.info.label(), what, needed, limit });
+        }
+        let flags = match role {
+            Role::Input => CL_MEM_READ_ONLY,
+            Role::Output => CL_MEM_WRITE_ONLY,
+        };
+        // SAFETY: no host memory is handed over.
+        let buffer = unsafe { Buffer::<u8>::create(&self.context, flags, bytes, ptr::null_mut::<c_void>()) };
+        let buffer = buffer.map_err(self.failed("asking for memory"))?;
+        Ok(Memory { buffer, room: room.max(1), values: PhantomData })
+    }
+
+    /// Writes values to the beginning of the memory.
+    ///
+    /// # Panics
+    /// If it has no room for them.
+    fn write<T: Pod>(&self, memory: &mut Memory<T>, values: &[T]) -> Result<(), Error> {
+        assert!(values.len() <= memory.room);
+        if values.is_empty() {
+            return Ok(());
+        }
+        let bytes = bytemuck::cast_slice(values);
+        // SAFETY: the call waits until the bytes are read, and there is room for them.
+        let done = unsafe { self.queue.enqueue_write_buffer(&mut memory.buffer, CL_TRUE, 0, bytes, &[]) };
+        done.map(|_| ()).map_err(self.failed("writing to its memory"))
+    }
+
+    /// Reads values from the beginning of the memory, when all work before is done.
+    ///
+    /// # Panics
+    /// If it has fewer.
+    pub fn read<T: Pod>(&self, memory: &Memory<T>, values: &mut [T]) -> Result<(), Error> {
+        assert!(values.len() <= memory.room);
+        if values.is_empty() {
+            return Ok(());
+        }
+        let bytes = bytemuck::cast_slice_mut(values);
+        // SAFETY: the call waits until the bytes are written, and there are as many.
+        let done = unsafe { self.queue.enqueue_read_buffer(&memory.buffer, CL_TRUE, 0, bytes, &[]) };
+        done.map(|_| ()).map_err(self.failed("reading from its memory"))
+    }
+
+    /// Starts a kernel with at least so many work-items; what is behind the last has to be seen to by the kernel.
+    pub fn launch(&self, kernel: &Kernel, arguments: &[Argument], items: usize) -> Result<(), Error> {
+        for (index, argument) in (0..).zip(arguments) {
+            // SAFETY: each is handed over by reference to a value of the type that the kernel declares there.
+            let set = unsafe {
+                match argument {
+                    Argument::Memory(memory, _) => kernel.set_arg(index, memory),
+                    Argument::U32(number) => kernel.set_arg(index, number),
+                    Argument::U64(number) => kernel.set_arg(index, number),
+                    Argument::F32(number) => kernel.set_arg(index, number),
+                }
+            };
+            set.map_err(self.failed("setting an argument"))?;
+        }
+        let most = kernel.get_work_group_size(self.info.id as cl_device_id).unwrap_or(1).max(1);
+        let group = if items == 1 { 1 } else { GROUP.min(most) };
+        let global = items.next_multiple_of(group);
+        // SAFETY: the kernels look at nothing beyond the memory they get, for as many items as they are told.
+        let started = unsafe {
+            self.queue.enqueue_nd_range_kernel(kernel.get(), 1, ptr::null(), &raw const global, &raw const group, &[])
+        };
+        started.map(|_| ()).map_err(self.failed("starting a kernel"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::opencl::devices::choose;
+
+    /// A device whose answers can be made up.
+    fn open() -> Device {
+        Device::open(choose(None).unwrap()).unwrap()
+    }
+
+    #[test]
+    #[ignore = "needs an OpenCL device: run tests/all"]
+    fn what_the_compiler_says_is_told() {
+        let device = open();
+        let text = program::text(4, 20, device.info.double);
+        let broken = device.compile(&text.replace("float4 position;", "flaot4 position;")).unwrap_err().to_string();
+        assert!(broken.contains("don't compile") && broken.contains("flaot4"), "{broken}");
+        let missing = device.compile(&text.replace("first_hit(", "last_hit(")).unwrap_err().to_string();
+        assert!(missing.contains("no kernel `first_hit`"), "{missing}");
+        let other = device.compile(&text.replace("uint padding[2];", "uint padding[6];")).unwrap_err();
+        assert!(matches!(other, Error::Layout { .. }), "{other}");
+        assert!(device.compile(&text).is_ok());
+    }
+
+    #[test]
+    #[ignore = "needs an OpenCL device: run tests/all"]
+    fn what_does_not_fit_is_told() {
+        let mut device = open();
+        let room = device.info.largest as usize / 4 + 1;
+        let error = device.output::<f32>(room, "the corners of the simplices").unwrap_err();
+        assert!(matches!(error, Error::TooLarge { .. }) && error.to_string().contains("the corners"), "{error}");
+        // A device that says it takes anything, and doesn't.
+        device.info.largest = 0;
+        let error = device.output::<f32>(1 << 50, "results").unwrap_err().to_string();
+        assert!(error.starts_with(&device.info.label()) && error.contains("asking for memory failed"), "{error}");
+    }
+}

@@ -1,0 +1,29 @@
+//! First hits and open fractions on any OpenCL device: the same bits as on the processor.
+//!
+//! What a ray hits is defined by exact signs. A device settles nearly all rays in single precision, beside a bound on the
+//! rounding, some more in double precision if it has that, and leaves the rest to the host, which decides exactly. So the
+//! device's arithmetic need not be like the host's, with one exception: the directions of the rays, which it makes from
+//! integers by few, correctly rounded operations. Whether it does that right is tried when it is opened; if not, they
+//! are made here and handed over.
+//!
+//! - [`devices()`]: what there is;
+//! - `device`: an open device, the only file that calls OpenCL;
+//! - `layout`, `program`: the structs and the text of the kernels (`kernels/*.cl`);
+//! - [`OpenClBackend`]: a mesh with its hierarchy on devices;
+//! - `points`: shading points, in batches short enough for watchdogs and for whoever wants to stop.
+//!
+//! libOpenCL is opened at run time; nothing of it is needed to build, or to run without it.
+
+mod backend;
+mod device;
+mod devices;
+mod error;
+mod layout;
+mod open;
+mod points;
+mod program;
+
+pub use backend::OpenClBackend;
+pub use devices::{Info, Kind, devices, preferred};
+pub use error::Error;
+pub use open::OpenCl;

@@ -1,0 +1,78 @@
+//! The kernels' text, and what becomes of it on a device.
+
+use super::layout;
+use crate::trace::sampling::LOWEST_SQUARED_COSINE;
+
+const LAYOUT: &str = include_str!("../../../kernels/layout.cl");
+const SAMPLING: &str = include_str!("../../../kernels/sampling.cl");
+const CONE: &str = include_str!("../../../kernels/cone.cl");
+const TRACE: &str = include_str!("../../../kernels/trace.cl");
+
+/// The kernels of the program.
+#[cfg(test)]
+const KERNELS: [&str; 4] = ["layout", "directions", "occluded", "first_hit"];
+
+/// The text for dimension `d`, with room for hierarchies of so many levels. In one piece, as some wrappers and drivers
+/// can't take more, and without comments, which some compilers don't take either.
+pub(super) fn text(d: usize, depth: usize, double: bool) -> String {
+    let mut text = format!(
+        "#define D {d}\n#define STACK {}\n#define LOWEST_SQUARED_COSINE {LOWEST_SQUARED_COSINE:e}f\n",
+        depth.max(1)
+    );
+    if double {
+        text += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n#define DOUBLE\n";
+    }
+    text += LAYOUT;
+    text += SAMPLING;
+    let precision = |real: &str, name: &str, convert: &str, half_ulp: f64| {
+        format!(
+            "#define REAL {real}\n#define REAL4 {real}4\n#define NAME(x) x##_{name}\n#define CONVERT(x) {convert}\n\
+             #define HALF_ULP (({real}){half_ulp:e})\n{CONE}\n#undef REAL\n#undef REAL4\n#undef NAME\n#undef CONVERT\n\
+             #undef HALF_ULP\n#undef HALF_ULPS\n"
+        )
+    };
+    text += &precision("float", "single", "(x)", f64::from(f32::EPSILON) / 2.0);
+    if double {
+        text += &precision("double", "double", "convert_double4(x)", f64::EPSILON / 2.0);
+    }
+    text += TRACE;
+    without_comments(&text)
+}
+
+/// Replaces each comment by a space. The kernels have no string with a comment's sign in it.
+fn without_comments(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(start) = rest.find("/*") {
+        out += &rest[..start];
+        out.push(' ');
+        rest = rest[start..].find("*/").map_or("", |end| &rest[start + end + 2..]);
+    }
+    out + rest
+}
+
+/// The kernel's sizes are held against these.
+pub(super) fn expected_layout() -> Vec<u32> {
+    layout::sizes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_plain() {
+        for (d, double) in [(3, false), (3, true), (4, false), (4, true)] {
+            let text = text(d, 20, double);
+            assert!(text.is_ascii() && !text.contains("/*") && !text.contains("//") && !text.contains("??/"));
+            assert!(!text.contains("\\\n"));
+            for kernel in KERNELS {
+                assert_eq!(text.matches(&format!("void {kernel}(")).count(), 1, "{kernel}");
+            }
+            let opened = text.matches("#if").count();
+            assert_eq!(opened, text.matches("#endif").count());
+            assert_eq!(text.contains("double4"), double);
+        }
+        assert_eq!(without_comments("a /* b */ c/**/d"), "a   c d");
+    }
+}

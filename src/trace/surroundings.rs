@@ -1,0 +1,86 @@
+//! What the mesh right around a shading point hides, and whether a ray from there escapes.
+//!
+//! No ray can be traced against a simplex that has the ray's origin as a corner: it would hit at distance 0. What such a
+//! simplex hides is a cone of directions instead, spanned by its edges from there and by the inverted normal. All the
+//! simplices around a vertex are its star.
+
+use crate::accel::Tracer;
+use crate::geometry::{Column, Cone, Frame, Ray, Vector, widen};
+use crate::mesh::Mesh;
+
+use super::point::ShadingPoint;
+
+/// What a simplex with a corner at the point hides: the cone of its edges from there and -normal. None if it is wholly
+/// below the tangent hyperplane, and hides nothing above it.
+pub(super) fn star_cone<const D: usize>(
+    mesh: &Mesh<D>,
+    position: Vector<D>,
+    normal: Vector<D>,
+    identity: u32,
+    simplex: u32,
+) -> Option<Cone<D>> {
+    let mut columns = [Column::vector(-normal); D];
+    let mut rises = false;
+    let others = mesh.simplices[simplex as usize].into_iter();
+    for (column, v) in columns.iter_mut().zip(others.filter(|&v| mesh.identity[v as usize] != identity)) {
+        let other = mesh.vertices[v as usize];
+        *column = Column::edge(other, position);
+        let edge = widen(&other) - widen(&position);
+        rises |= edge.dot(&widen(&normal)) > 0.0;
+    }
+    rises.then(|| Cone::new(columns))
+}
+
+/// The cones that the star of a vertex hides; none of a point that is no vertex.
+pub(super) fn star_cones<const D: usize>(tracer: &Tracer<D>, point: &ShadingPoint<D>) -> Vec<Cone<D>> {
+    let ShadingPoint::Vertex(vertex) = *point else { return Vec::new() };
+    let mesh = tracer.mesh();
+    let (position, normal) = (mesh.vertices[vertex as usize], mesh.normals[vertex as usize]);
+    let identity = mesh.identity[vertex as usize];
+    let around = tracer.incidence().around(identity).iter();
+    around.filter_map(|&simplex| star_cone(mesh, position, normal, identity, simplex)).collect()
+}
+
+/// A shading point with all that decides whether a ray from there escapes. This is the slow way, which defines it.
+#[derive(Clone, Debug)]
+pub struct Surroundings<const D: usize> {
+    /// Where the rays start.
+    pub position: Vector<D>,
+    /// The middle of the hemisphere; of length 1, or zero if there is none.
+    pub normal: Vector<D>,
+    /// What the vertex star hides.
+    star: Vec<Cone<D>>,
+    /// The simplex this point is inside of.
+    ignored: Option<u32>,
+}
+
+impl<const D: usize> Surroundings<D> {
+    /// Those of a point.
+    pub fn of(tracer: &Tracer<D>, point: &ShadingPoint<D>) -> Self {
+        let mesh = tracer.mesh();
+        Self {
+            position: point.position(mesh),
+            normal: point.normal(mesh),
+            star: star_cones(tracer, point),
+            ignored: point.ignored(),
+        }
+    }
+
+    /// The local frame, around the normal.
+    pub fn frame(&self) -> Frame<D> {
+        Frame::new(&self.normal)
+    }
+
+    /// Whether the vertex star hides the ray's direction.
+    #[inline]
+    pub(crate) fn hides(&self, ray: &Ray<D>) -> bool {
+        self.star.iter().any(|cone| cone.contains(&ray.direction))
+    }
+
+    /// The visibility V of a direction: whether a ray escapes, or reaches `limit`.
+    #[inline]
+    pub fn is_visible(&self, tracer: &Tracer<D>, direction: Vector<D>, limit: f32) -> bool {
+        let ray = Ray::new(self.position, direction);
+        !self.hides(&ray) && !tracer.occluded(&ray, limit, self.ignored)
+    }
+}

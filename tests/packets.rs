@@ -1,0 +1,224 @@
+//! The fast engine against the slow one: the same bits at every level of instructions, on scenes that are easy, and on
+//! scenes full of coincidences.
+
+use ao4d::accel::Tracer;
+use ao4d::geometry::{Ray, Vector, Vector64};
+use ao4d::mesh::{Mesh, Surface};
+use ao4d::occlusion::{Estimates, Estimator};
+use ao4d::progress::Silent;
+use ao4d::trace::cpu::{CpuBackend, Level, PacketTracer, ScalarBackend};
+use ao4d::trace::{RayBackend, Sampler, Sampling, ShadingPoint, Target};
+
+mod support;
+
+use support::{Random, mesh};
+
+fn soup<const D: usize>(seed: u32, count: usize, size: f64, coarse: bool) -> Surface<D> {
+    Random(seed).soup(count, size, coarse)
+}
+
+/// The graph of `height` over a grid of n^(D-1) cells, each cut along its diagonals (Kuhn).
+fn graph<const D: usize>(n: u32, height: impl Fn(&[f64]) -> f64) -> Surface<D> {
+    let side = n + 1;
+    let vertices = (0..side.pow(D as u32 - 1))
+        .map(|index| {
+            let mut point = Vector64::<D>::from_fn(|r, _| f64::from(index / side.pow(r as u32) % side) / f64::from(n));
+            point[D - 1] = height(&point.as_slice()[..D - 1]);
+            point
+        })
+        .collect();
+    let orders: &[&[usize]] = if D == 3 {
+        &[&[0, 1], &[1, 0]]
+    } else {
+        &[&[0, 1, 2], &[1, 2, 0], &[2, 0, 1], &[0, 2, 1], &[2, 1, 0], &[1, 0, 2]]
+    };
+    let mut simplices = Vec::new();
+    for cell in 0..n.pow(D as u32 - 1) {
+        let low: u32 = (0..D as u32 - 1).map(|r| cell / n.pow(r) % n * side.pow(r)).sum();
+        for (k, order) in orders.iter().enumerate() {
+            let mut simplex = [low; D];
+            for corner in 1..D {
+                simplex[corner] = simplex[corner - 1] + side.pow(order[corner - 1] as u32);
+            }
+            // Half of the orders are odd permutations; so is moving the last axis before three others.
+            if (k >= orders.len() / 2) ^ (D == 4) {
+                simplex.swap(0, 1);
+            }
+            simplices.push(simplex);
+        }
+    }
+    Surface { vertices, simplices, normals: None }
+}
+
+fn moved<const D: usize>(mut surface: Surface<D>, factor: f64, by: f64) -> Surface<D> {
+    surface.vertices.iter_mut().for_each(|v| *v = v.map(|x| x * factor + by));
+    surface
+}
+
+fn sampling(sampler: Sampler, samples: u32, max_distance: f32) -> Sampling {
+    Sampling { sampler, max_distance, ..Sampling::new(samples, 5) }
+}
+
+/// Points inside the simplices, and some off them, with normals that look anywhere.
+fn visible_points<const D: usize>(mesh: &Mesh<D>, random: &mut Random) -> Vec<ShadingPoint<D>> {
+    let count = mesh.simplices.len().min(60) as u32;
+    let point = |n: u32| {
+        let simplex = n * mesh.simplices.len() as u32 / count;
+        let corners = mesh.corners(simplex);
+        let weights: [f32; D] = std::array::from_fn(|_| random.point::<D>(false)[0].abs() as f32 + 0.01);
+        let total: f32 = weights.iter().sum();
+        let inside = (0..D).fold(Vector::zeros(), |sum: Vector<D>, i| sum + corners[i] * (weights[i] / total));
+        let normal = random.point::<D>(false).map(|x| x as f32).normalize();
+        let off = if n % 9 == 8 { 3.0 } else { 1.0 };
+        ShadingPoint::Inside { position: inside * off, normal, simplex, number: u64::from(n) * 7 }
+    };
+    (0..count).map(point).collect()
+}
+
+/// Values and errors by rays.
+fn estimate<const D: usize>(backend: &dyn RayBackend<D>, points: &[ShadingPoint<D>], sampling: &Sampling) -> Estimates {
+    Estimator::Sampled(*sampling).estimate(backend, points, None, &Silent).unwrap()
+}
+
+/// The values of all levels and the slow ones are the same, at vertices and at visible points.
+fn check<const D: usize>(name: &str, surface: &Surface<D>, sampling: &Sampling) -> Vec<f32> {
+    let tracer = std::sync::Arc::new(Tracer::new(mesh(surface)));
+    let vertices = ShadingPoint::vertices(tracer.mesh());
+    let points = [vertices.clone(), visible_points(tracer.mesh(), &mut Random(11))].concat();
+    let mut values = Vec::new();
+    for target in [None, Some(Target { error: 0.04 })] {
+        let sampling = Sampling { target, ..*sampling };
+        let slow = estimate(&ScalarBackend::new(tracer.clone()), &points, &sampling);
+        for level in Level::available() {
+            let fast = estimate(&CpuBackend::with_level(tracer.clone(), level), &points, &sampling);
+            assert_eq!(fast.rays, slow.rays, "{name}, D = {D}, {level:?}");
+            for (i, point) in points.iter().enumerate() {
+                let [found, expected] = [&fast, &slow].map(|e| (e.values[i].to_bits(), e.errors[i].to_bits()));
+                assert_eq!(found, expected, "{name}, D = {D}, {level:?}, {target:?}, {point:?}");
+            }
+        }
+        values.push(slow.values);
+    }
+    values[0][..vertices.len()].to_vec()
+}
+
+fn scenes<const D: usize>() {
+    let sobol = sampling(Sampler::Sobol, 64, f32::INFINITY);
+    let few = if D == 3 { 12 } else { 5 };
+    let bumps = |x: &[f64]| x.iter().map(|x| 0.2 * (9.0 * x).sin()).sum();
+    let fold = |x: &[f64]| (x[0] - 0.5).abs();
+    let crease = |x: &[f64]| -2.0 * (x[0] - 0.5).abs().min((x[1] - 0.5).abs());
+    let step = |x: &[f64]| if x[0] > 0.5 { 0.3 } else { 0.0 };
+    let tilt = |x: &[f64]| x.iter().sum::<f64>() * 0.3;
+    let dark = |name: &str, surface: &Surface<D>, sampling: &Sampling| {
+        let values = check(name, surface, sampling);
+        let rays = values.len() as f64 * f64::from(sampling.samples);
+        let visible = values.iter().map(|&v| f64::from(v) * f64::from(sampling.samples)).sum::<f64>();
+        let blocked = rays - visible;
+        assert!(visible > 100.0 && blocked > 100.0, "{name}: {visible} and {blocked} rays: nothing is tested");
+    };
+    dark("soup", &soup(1, 300, 0.3, false), &sobol);
+    dark("dense soup", &soup(1, 100, 1.0, false), &sampling(Sampler::Sobol, 100, f32::INFINITY));
+    dark("coarse soup", &soup(2, 60, 0.5, true), &sobol);
+    dark("coarse soup", &soup(3, 70, 0.5, true), &sampling(Sampler::Random, 77, f32::INFINITY));
+    dark("bumps", &graph(few, bumps), &sobol);
+    dark("bumps", &graph(few, bumps), &sampling(Sampler::Sobol, 200, f32::INFINITY));
+    dark("fold", &graph(few, fold), &sobol);
+    dark("crease", &graph(few, crease), &sobol);
+    dark("step", &graph(few, step), &sobol);
+    check::<D>("flat", &graph(few, |_| 0.0), &sobol);
+    check::<D>("tilted", &graph(few, tilt), &sobol);
+    dark("far soup", &moved(soup(1, 200, 0.3, false), 1.0, 1000.0), &sobol);
+    dark("far bumps", &moved(graph(few, bumps), 1.0, 3e4), &sobol);
+    dark("tiny soup", &moved(soup(1, 100, 0.3, false), 1e-20, 0.0), &sobol);
+    dark("huge soup", &moved(soup(1, 100, 0.3, false), 1e29, 0.0), &sobol);
+    // Slivers: one axis shrunk to nearly nothing.
+    let mut slivers = soup::<D>(4, 100, 0.3, false);
+    slivers.vertices.iter_mut().for_each(|v| v[1] = v[1].mul_add(1e-6, v[0]));
+    check("slivers", &slivers, &sobol);
+    // Limited distance.
+    dark("near only", &soup(1, 200, 0.3, false), &sampling(Sampler::Sobol, 64, 0.4));
+    dark("near only, coarse", &soup(2, 60, 0.5, true), &sampling(Sampler::Sobol, 64, 0.5));
+    // A speck in a large scene, whose products vanish in single precision.
+    let mut speck = soup::<D>(6, 40, 0.5, false);
+    let small = moved(soup::<D>(7, 40, 0.5, false), 1e-13, 0.0);
+    let shift = speck.vertices.len() as u32;
+    speck.vertices.extend(small.vertices);
+    speck.simplices.extend(small.simplices.iter().map(|s| s.map(|v| v + shift)));
+    dark("speck", &speck, &sobol);
+}
+
+#[test]
+fn all_levels_give_the_slow_values_in_3d() {
+    scenes::<3>();
+}
+
+#[test]
+fn all_levels_give_the_slow_values_in_4d() {
+    scenes::<4>();
+}
+
+fn any_rays<const D: usize>() {
+    // From anywhere, in any direction, ignoring a simplex.
+    let mut random = Random(3);
+    for coarse in [false, true] {
+        let mesh = mesh(&soup::<D>(8, 80, 0.6, coarse));
+        let tracer = Tracer::new(mesh);
+        let mut all = 0;
+        for n in 0..200 {
+            let origin = random.point::<D>(coarse).map(|x| x as f32) * if n % 10 == 0 { 5.0 } else { 1.0 };
+            let directions: Vec<Vector<D>> = (0..90)
+                .map(|_| random.point::<D>(coarse).map(|x| x as f32))
+                .filter(|d| d.amax() > 0.0)
+                .map(|d| d.normalize())
+                .collect();
+            let limit = if n % 3 == 0 { 0.7 } else { f32::INFINITY };
+            let ignored = Some(random.0 % 80);
+            let rays = directions.iter().map(|d| Ray::new(origin, *d));
+            let expected = rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
+            all += expected;
+            for level in Level::available() {
+                let found = PacketTracer::new(level).count_occluded(
+                    &tracer,
+                    &origin,
+                    directions[0],
+                    &directions,
+                    limit,
+                    ignored,
+                );
+                assert_eq!(found, expected, "{level:?} {n}");
+            }
+        }
+        assert!(all > 1000);
+    }
+}
+
+#[test]
+fn any_rays_from_anywhere() {
+    any_rays::<3>();
+    any_rays::<4>();
+}
+
+#[test]
+fn no_simplices_and_no_vertices() {
+    let empty = mesh::<4>(&Surface { vertices: vec![], simplices: vec![], normals: None });
+    let sobol = sampling(Sampler::Sobol, 64, f32::INFINITY);
+    assert_eq!(estimate(&CpuBackend::new(Tracer::new(empty)), &[], &sobol), Estimates::default());
+    let points =
+        mesh::<3>(&Surface { vertices: vec![Vector64::zeros(); 3], simplices: vec![[0, 1, 2]], normals: None });
+    let vertices = ShadingPoint::vertices(&points);
+    assert_eq!(estimate(&CpuBackend::new(Tracer::new(points)), &vertices, &sobol).values, vec![1.0; 3]);
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let backend = CpuBackend::new(Tracer::new(mesh(&soup::<4>(9, 400, 0.3, false))));
+    let mesh = backend.tracer().mesh();
+    let points = [ShadingPoint::vertices(mesh), visible_points(mesh, &mut Random(2))].concat();
+    let sobol = sampling(Sampler::Sobol, 64, f32::INFINITY);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| estimate(&backend, &points, &sobol))
+    };
+    assert_eq!(with(1), with(3));
+}
