@@ -64,7 +64,12 @@ fn measure<const D: usize>(name: &str, pipeline: &Pipeline, mesh: Mesh<D>) {
         let crossing = Cone::of_simplex(&ray.origin, &corners).crossing(&ray.direction);
         let normal = normal_of(&corners.map(|v| widen(&v))).normalize();
         let normal = if normal.dot(&widen(&ray.direction)) > 0.0 { -normal } else { normal };
-        ShadingPoint::Inside { position: narrow(&ray.at(crossing.t)), normal: narrow(&normal), simplex, number: n as u64 }
+        ShadingPoint::Inside {
+            position: narrow(&ray.at(crossing.t)),
+            normal: narrow(&normal),
+            simplex,
+            number: n as u64,
+        }
     };
     let points: Vec<ShadingPoint<D>> = some(&seen).into_iter().map(point).collect();
     let vertices = some(&ShadingPoint::vertices(mesh));

@@ -37,10 +37,10 @@ fn told(error: &TiffError) -> String {
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened, String> {
     let directories = Directories::read(path)?;
     let mut decoder = Decoder::new(Grey::open(path, &directories)?).map_err(|e| told(&e))?;
-    let mut limits = Limits::unlimited();
-    // Lists of places and texts, not pages, whose sizes are held against the memory here.
-    limits.ifd_value_size = usize::try_from(length).unwrap_or(usize::MAX);
-    decoder = decoder.with_limits(limits);
+    // A description may be long: as long as the file at most.
+    let mut limits = Limits::default();
+    limits.ifd_value_size = limits.ifd_value_size.max(usize::try_from(length).unwrap_or(usize::MAX));
+    decoder = decoder.with_limits(limits.clone());
     let (width, height) = decoder.dimensions().map_err(|e| told(&e))?;
     if u64::from(width) * u64::from(height) > length.saturating_mul(MOST_POINTS_A_BYTE) || width == 0 || height == 0 {
         return Err(format!("is cut off: it declares pages of {width} x {height} points, but has {length} bytes"));
@@ -111,6 +111,12 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
             ));
         }
         room_for(size as u64 * (kind.size() as u64 + 1), "it is read page by page, and a page is held")?;
+        // Lists in its directories keep the decoder's own limit; a page may be larger.
+        let page_bytes = size.saturating_mul(kind.size());
+        limits.decoding_buffer_size = limits.decoding_buffer_size.max(page_bytes);
+        let packed = page_bytes.max(usize::try_from(length).unwrap_or(usize::MAX));
+        limits.intermediate_buffer_size = limits.intermediate_buffer_size.max(packed);
+        decoder = decoder.with_limits(limits);
         let row = page.width * samples;
         let inner = 2 + usize::from(samples > 1);
         Box::new(Pages { decoder, size, row, bits, inner, pages: layout.pages.clone(), at: 0, current: None, meaning })
