@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use super::Mesh;
+use super::facets::{has_double, sorted_facets};
 use crate::geometry::{Aabb, Cone, Vector, Vector64, determinant, plane_side, widen};
 
 /// How the open components of an object are oriented.
@@ -28,48 +29,6 @@ pub enum Viewpoint<const D: usize> {
     Direction(Vector<D>),
 }
 
-/// A facet seen from one of its simplices: the identities of its corners sorted, and how that sort and the place of
-/// the opposite corner orient it.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Facet {
-    corners: [u32; 3],
-    simplex: u32,
-    even: bool,
-}
-
-/// The facets of the simplices, sorted, so that the simplices around a facet stand together. Simplices with two equal
-/// corners are left out: they have no facet that isn't doubled or degenerate itself.
-fn sorted_facets<const D: usize>(corners: &[[u32; D]]) -> Vec<Facet> {
-    let mut facets = Vec::with_capacity(corners.len() * D);
-    for (s, simplex) in corners.iter().enumerate() {
-        if (0..D).any(|i| simplex[i + 1..].contains(&simplex[i])) {
-            continue;
-        }
-        for opposite in 0..D {
-            let mut key = [u32::MAX; 3];
-            let mut n = 0;
-            for (i, &corner) in simplex.iter().enumerate() {
-                if i != opposite {
-                    key[n] = corner;
-                    n += 1;
-                }
-            }
-            let mut even = opposite % 2 == 0;
-            for i in 1..n {
-                let mut j = i;
-                while j > 0 && key[j - 1] > key[j] {
-                    key.swap(j - 1, j);
-                    even = !even;
-                    j -= 1;
-                }
-            }
-            facets.push(Facet { corners: key, simplex: s as u32, even });
-        }
-    }
-    facets.sort_unstable();
-    facets
-}
-
 /// A set of simplices connected through facets.
 struct Component {
     simplices: Vec<u32>,
@@ -79,14 +38,16 @@ struct Component {
 /// Splits the simplices into components, and finds for each simplex whether it must be turned to agree with the first
 /// of its component.
 fn components<const D: usize>(corners: &[[u32; D]]) -> (Vec<Component>, Vec<bool>) {
-    let facets = sorted_facets(corners);
+    let mut facets = sorted_facets(corners);
+    // A simplex with two equal corners has no facet that isn't doubled or degenerate itself.
+    facets.retain(|facet| !has_double(&corners[facet.simplex as usize]));
     let mut neighbours: Vec<[Option<(u32, bool)>; D]> = vec![[None; D]; corners.len()];
     let mut open = vec![false; corners.len()];
     for around in facets.chunk_by(|a, b| a.corners == b.corners) {
         if let [a, b] = around {
             for (one, other) in [(a, b), (b, a)] {
                 let free = neighbours[one.simplex as usize].iter_mut().find(|n| n.is_none());
-                *free.expect("a simplex has D facets") = Some((other.simplex, a.even == b.even));
+                *free.expect("a simplex has D facets") = Some((other.simplex, a.turned == b.turned));
             }
         } else {
             around.iter().for_each(|f| open[f.simplex as usize] = true);

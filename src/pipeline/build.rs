@@ -2,7 +2,7 @@
 
 use super::Invalid;
 use super::plan::{CameraPlan, Plan, ProjectionPlan, SceneCounts, ScenePlan};
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
 use crate::mesh::{Mesh, MeshBuilder, Orientation};
 use crate::render::{Camera, Projection, View};
 use crate::scene::{self, build_object_with_notes};
@@ -23,8 +23,8 @@ impl AnyMesh {
     /// Whatever is wrong with an object, at the key to blame.
     pub fn build(plan: &Plan, scene: usize, notes: &mut Vec<String>) -> Result<Self, Invalid> {
         match plan.scenes[scene].dimension {
-            3 => build(plan, scene, notes).map(Self::Three),
-            _ => build(plan, scene, notes).map(Self::Four),
+            Dimension::Three => build(plan, scene, notes).map(Self::Three),
+            Dimension::Four => build(plan, scene, notes).map(Self::Four),
         }
     }
 
@@ -88,7 +88,8 @@ pub fn build<const D: usize>(plan: &Plan, scene: usize, notes: &mut Vec<String>)
             },
         };
         let color = object.color.rgb().map_err(blame)?;
-        builder.add(&name, color, &surface, open).map_err(|e| refuse("", e.to_string()))?;
+        let crease = object.crease().map_err(blame)?;
+        builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
     }
     Ok(builder.finish())
 }

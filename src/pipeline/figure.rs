@@ -5,6 +5,7 @@ use super::files::{PROGRAM, beside, holds, paraview, write_whole};
 use super::plan::{FigurePlan, Plan};
 use super::spec::Reader;
 use super::{Axis, Cut, RunError};
+use crate::geometry::Dimension;
 use crate::volume::Grid;
 
 /// Writes the state, if it isn't there already or with `force`. Returns its length, and whether it was left alone.
@@ -16,8 +17,8 @@ pub(super) fn write(plan: &Plan, figure: &FigurePlan, force: bool) -> Result<(u6
         let write = &plan.writes[write];
         let render = &plan.renders[write.render];
         let grid: Grid = match plan.scenes[render.scene].dimension {
-            3 => camera::<3>(&render.camera)?.grid(render.dimensions),
-            _ => camera::<4>(&render.camera)?.grid(render.dimensions),
+            Dimension::Three => camera::<3>(&render.camera)?.grid(render.dimensions),
+            Dimension::Four => camera::<4>(&render.camera)?.grid(render.dimensions),
         };
         let file = match figure.reader {
             Reader::Vti => &write.vti,

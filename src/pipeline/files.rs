@@ -9,7 +9,7 @@ use super::plan::{Computation, OcclusionSource, Plan, Samples, WritePlan};
 use super::prepare::sidecar_path;
 use super::spec;
 use super::work::Stale;
-use crate::geometry::widen;
+use crate::geometry::{Dimension, widen};
 use crate::io::vti::{self, ArraySpec, VtiWriter};
 use crate::io::{self, AtomicFile, Error, png, raw::RawWriter, vtu};
 use crate::mesh::Mesh;
@@ -115,8 +115,11 @@ impl PictureFiles {
     }
 }
 
-fn array_spec(channel: Channel, dimension: usize) -> ArraySpec {
-    let components = if dimension == 3 { channel.components::<3>() } else { channel.components::<4>() };
+fn array_spec(channel: Channel, dimension: Dimension) -> ArraySpec {
+    let components = match dimension {
+        Dimension::Three => channel.components::<3>(),
+        Dimension::Four => channel.components::<4>(),
+    };
     ArraySpec::new(channel.name(), channel.kind(), components)
 }
 
@@ -204,13 +207,14 @@ pub(super) fn write_mesh<const D: usize>(
     let mut before = vec![true; mesh.vertices.len()];
     let mut points = vec![[0.0f32; 3]; mesh.vertices.len()];
     for (i, vertex) in mesh.vertices.iter().enumerate() {
-        if D == 3 {
-            points[i] = std::array::from_fn(|a| vertex[a]);
-        } else {
-            let (image, distance) = camera.project(vertex);
-            let image = image.map(|x| x as f32);
-            before[i] = distance > 0.0 && image.iter().all(|x| x.is_finite());
-            points[i] = if before[i] { image } else { [0.0; 3] };
+        match Dimension::of::<D>() {
+            Dimension::Three => points[i] = std::array::from_fn(|a| vertex[a]),
+            Dimension::Four => {
+                let (image, distance) = camera.project(vertex);
+                let image = image.map(|x| x as f32);
+                before[i] = distance > 0.0 && image.iter().all(|x| x.is_finite());
+                points[i] = if before[i] { image } else { [0.0; 3] };
+            }
         }
     }
     let shown: Vec<usize> =
@@ -235,12 +239,15 @@ pub(super) fn write_mesh<const D: usize>(
         }
     }
     let mut file = AtomicFile::create(path)?;
-    if D == 3 {
-        let cells: Vec<[u32; 3]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
-        vtu::write(&mut file, &points, vtu::Cells::Triangles(&cells), &arrays, &[])
-    } else {
-        let cells: Vec<[u32; 4]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
-        vtu::write(&mut file, &points, vtu::Cells::Tetrahedra(&cells), &arrays, &[])
+    match Dimension::of::<D>() {
+        Dimension::Three => {
+            let cells: Vec<[u32; 3]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+            vtu::write(&mut file, &points, vtu::Cells::Triangles(&cells), &arrays, &[])
+        }
+        Dimension::Four => {
+            let cells: Vec<[u32; 4]> = shown.iter().map(|&s| std::array::from_fn(|i| mesh.simplices[s][i])).collect();
+            vtu::write(&mut file, &points, vtu::Cells::Tetrahedra(&cells), &arrays, &[])
+        }
     }
     .map_err(AtomicFile::name_in(path))?;
     Ok((file.commit()?, mesh.simplices.len() - shown.len()))
@@ -269,7 +276,7 @@ pub(super) fn beside(state: &Path, file: &Path) -> String {
 /// Whether a file holds just these bytes already.
 pub(super) fn holds(path: &Path, bytes: &[u8]) -> bool {
     std::fs::metadata(path).is_ok_and(|m| m.len() == bytes.len() as u64)
-        && std::fs::read(path).is_ok_and(|found| found == bytes)
+        && crate::input::read(path).is_ok_and(|found| found == bytes)
 }
 
 pub(super) use io::paraview;

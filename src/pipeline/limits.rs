@@ -6,6 +6,7 @@ use super::RunError;
 use super::plan::{Plan, RenderPlan, WritePlan};
 use super::spec::{Compression, Encoding};
 use super::work::Stale;
+use crate::geometry::Dimension;
 use crate::io;
 use crate::render::{Aov as Channel, Columns};
 use crate::volume::available_memory;
@@ -67,6 +68,9 @@ fn disk(plan: &Plan, stale: &Stale, index: usize) -> u64 {
 
 /// Bytes that a voxel takes in this array.
 fn bytes(plan: &Plan, render: &RenderPlan, channel: Channel) -> u64 {
-    let bytes = if plan.scenes[render.scene].dimension == 3 { channel.bytes::<3>() } else { channel.bytes::<4>() };
+    let bytes = match plan.scenes[render.scene].dimension {
+        Dimension::Three => channel.bytes::<3>(),
+        Dimension::Four => channel.bytes::<4>(),
+    };
     bytes as u64
 }

@@ -24,10 +24,10 @@ use serde::{Deserialize, Serialize};
 use super::Error;
 use super::fill::fill;
 use super::lattice::compact;
-use super::numbers::{check_count, finite, point};
+use super::numbers::{check_count, finite, only_in, point};
 use super::product::Chain;
 use super::transform::{self, TransformStep};
-use crate::geometry::{Vector64, determinant};
+use crate::geometry::{Dimension, Vector64, determinant};
 use crate::io::Input;
 use crate::io::mesh::Cells;
 use crate::mesh::Surface;
@@ -68,9 +68,7 @@ fn one() -> u32 {
 impl ExtrudeSpec {
     /// The walls, and caps if the mesh is of tetrahedra. Refused in 3D.
     pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
-        if D != 4 {
-            return Err(Error::invalid("extrude", format!("needs a scene of dimension 4, not {D}; take file")));
-        }
+        only_in::<D>(Dimension::Four, "extrude", "; take file")?;
         let (from, to) = (finite("extrude.from", self.from)?, finite("extrude.to", self.to)?);
         if from == to {
             return Err(Error::invalid("extrude.to", format!("{to} is also where the sweep begins; give another")));

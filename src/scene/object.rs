@@ -11,14 +11,16 @@ use super::cut_cube::CutCubeSpec;
 use super::extrude::ExtrudeSpec;
 use super::hypersphere::SphereSpec;
 use super::isosurface::IsosurfaceSpec;
-use super::numbers::AXES;
+use super::numbers::{AXES, only_in};
 use super::polytope::PolytopeSpec;
 use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
-use crate::mesh::Surface;
+use crate::geometry::Dimension;
+use crate::mesh::corners::DEFAULT_ANGLE;
+use crate::mesh::{Crease, Surface};
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,7 +33,7 @@ pub struct ObjectSpec {
     #[serde(default)]
     pub simplices: Option<SimplicesSpec>,
     /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.obj`, `.ply`,
-    /// `.msh`, `.vtk`, `.vtu` in 3D.
+    /// `.msh`, `.vtk`, `.vtp`, `.vtu` in 3D.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// Shape: a three-dimensional mesh swept along the fourth axis.
@@ -82,6 +84,29 @@ pub struct ObjectSpec {
     /// Which way an open surface faces.
     #[serde(default)]
     pub orientation: Orientation,
+    /// Where the surface creases: neighbours whose normals differ by more than this, in degrees, have a shading point each
+    /// at the vertices between them. 30 if left out, or more for an isosurface that is rough all over; listed simplices
+    /// keep their vertices. `off`: one normal a vertex.
+    #[serde(default)]
+    pub crease_angle: Option<CreaseAngle>,
+}
+
+/// An angle in degrees, or `off`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected degrees from 0 to 180, or off")]
+pub enum CreaseAngle {
+    /// Degrees, from 0 to 180.
+    Degrees(f64),
+    /// No creases.
+    Off(Off),
+}
+
+/// The word `off`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Off {
+    /// It.
+    Off,
 }
 
 /// Which way an open surface faces.
@@ -167,16 +192,16 @@ impl Shape<'_> {
     fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
-            Shape::File(path) => Ok(file::build(path, folder)?),
+            Shape::File(path) => Ok(file::build(path, folder, notes)?),
             Shape::Extrude(spec) => spec.build(folder),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),
             Shape::Tesseract(spec) => spec.build(),
             Shape::Hypersphere(spec) => spec.build("hypersphere"),
-            Shape::Sphere(_) if D != 3 => {
-                Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
+            Shape::Sphere(spec) => {
+                only_in::<D>(Dimension::Three, "sphere", "; take a hypersphere")?;
+                spec.build("sphere")
             }
-            Shape::Sphere(spec) => spec.build("sphere"),
             Shape::Isosurface(spec) => spec.build(folder, notes),
             Shape::Spin(spec) => spec.build(folder),
             Shape::Polytope(spec) => spec.build(),
@@ -221,6 +246,23 @@ impl ObjectSpec {
                  hypersphere, sphere, isosurface, spin, polytope, duoprism, duocylinder, spherinder, cubinder",
             )),
         }
+    }
+}
+
+impl ObjectSpec {
+    /// Where the object's vertices are split.
+    pub fn crease(&self) -> Result<Crease, Error> {
+        Ok(match (self.crease_angle, self.shape()?) {
+            (Some(CreaseAngle::Off(Off::Off)), _) => Crease::Never,
+            (Some(CreaseAngle::Degrees(degrees)), _) if (0.0..=180.0).contains(&degrees) => Crease::Above(degrees),
+            (Some(CreaseAngle::Degrees(degrees)), _) => {
+                let message = format!("expected degrees from 0 to 180, or off, found {degrees}");
+                return Err(Error::invalid("crease_angle", message));
+            }
+            (None, Shape::Simplices(_)) => Crease::Never,
+            (None, Shape::Isosurface(_)) => Crease::Rough,
+            (None, _) => Crease::Above(DEFAULT_ANGLE),
+        })
     }
 }
 

@@ -162,7 +162,7 @@ fn format(path: &Path) -> Option<Format> {
 }
 
 fn stored(input: &Input, request: &Request) -> Result<Opened, Error> {
-    let length = std::fs::metadata(&input.path).map_err(|source| input.unreadable(source))?.len();
+    let length = crate::input::length(&input.path).map_err(|source| input.unreadable(source))?;
     if length == 0 {
         return Err(input.wrong("is empty"));
     }

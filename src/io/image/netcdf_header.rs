@@ -73,7 +73,7 @@ impl Header {
     /// Reads the header of a file.
     pub fn read(path: &Path) -> Result<Self, String> {
         let mut bytes = Vec::new();
-        let file = std::fs::File::open(path).map_err(|e| e.to_string())?;
+        let file = crate::input::open(path).map_err(|e| e.to_string())?;
         file.take(LONGEST).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
         let version = match bytes.as_slice() {
             [b'C', b'D', b'F', version @ (1 | 2 | 5), ..] => *version,

@@ -194,7 +194,7 @@ pub(super) fn open(path: &Path, _: u64, request: &Request) -> Result<Opened, Str
     let offset = offset as u64;
     let sizes: Vec<usize> = (1..=5).map(|i| usize::try_from(size(i)).unwrap_or(usize::MAX)).collect();
     let needed = counted(&sizes, kind.size())?;
-    let length = std::fs::metadata(&values).map_err(|e| format!("its values, {}: {e}", values.display()))?.len();
+    let length = crate::input::length(&values).map_err(|e| format!("its values, {}: {e}", values.display()))?;
     if packing == Packing::None {
         holds(needed, offset, length, packing)?;
         fits(needed, offset, length, false, &mut notes)?;

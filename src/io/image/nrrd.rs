@@ -199,7 +199,7 @@ fn values(
         let own = file == path;
         let start = if own { fields.after.ok_or("is cut off: its header has no end")? } else { 0 };
         let named = |message: String| if own { message } else { format!("its data file {} {message}", file.display()) };
-        let length = std::fs::metadata(file).map_err(|e| named(format!("can't be read: {e}")))?.len();
+        let length = crate::input::length(file).map_err(|e| named(format!("can't be read: {e}")))?;
         let start = start + skipped(file, start, lines as u64).map_err(named)?;
         let start = match (bytes, packing) {
             (-1, _) => length.checked_sub(each).filter(|&at| at >= start).unwrap_or(start),

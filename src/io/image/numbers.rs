@@ -65,7 +65,7 @@ pub(super) enum Packing {
 
 /// The bytes of a file from an offset on, unpacked on the way.
 pub(super) fn stream(path: &Path, offset: u64, packing: Packing) -> Result<Box<dyn Stream>, String> {
-    let mut file = BufReader::with_capacity(1 << 18, File::open(path).map_err(|e| e.to_string())?);
+    let mut file = BufReader::with_capacity(1 << 18, crate::input::open(path).map_err(|e| e.to_string())?);
     file.seek(SeekFrom::Start(offset)).map_err(|e| e.to_string())?;
     Ok(match packing {
         Packing::Gzip => Box::new(Forwards(flate2::bufread::MultiGzDecoder::new(file))),
@@ -76,7 +76,7 @@ pub(super) fn stream(path: &Path, offset: u64, packing: Packing) -> Result<Box<d
 /// A file that is packed by gzip begins so.
 pub(super) fn is_gzip(path: &Path) -> bool {
     let mut magic = [0; 2];
-    File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == [0x1f, 0x8b]
+    crate::input::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == [0x1f, 0x8b]
 }
 
 /// What becomes of each number: a scale, a shift, and which ones are none.

@@ -7,8 +7,10 @@
 use serde::Serialize;
 
 use super::range::{check_length, positive};
+use crate::geometry::Dimension;
 use crate::pipeline::error::Invalid;
 use crate::pipeline::spec::{CameraSpec, Projection};
+use crate::text::number;
 
 /// Sines of angles below this count as parallel.
 const PARALLEL: f64 = 1e-6;
@@ -48,16 +50,17 @@ pub enum ProjectionPlan {
 pub(super) fn plan(
     spec: &CameraSpec,
     path: &str,
-    dimension: usize,
+    dimension: Dimension,
     warnings: &mut Vec<Invalid>,
 ) -> Result<CameraPlan, Invalid> {
-    let axis = |a: usize| -> Vec<f64> { (0..dimension).map(|i| f64::from(i == a)).collect() };
+    let count = dimension.get();
+    let axis = |a: usize| -> Vec<f64> { (0..count).map(|i| f64::from(i == a)).collect() };
     let vector = |key: &str, given: &Option<Vec<f64>>, default: Vec<f64>| match given {
-        Some(v) => check_vector(&format!("{path}.{key}"), v, dimension),
+        Some(v) => check_vector(&format!("{path}.{key}"), v, count),
         None => Ok(default),
     };
-    let eye = vector("eye", &spec.eye, axis(dimension - 1))?;
-    let target = vector("target", &spec.target, vec![0.0; dimension])?;
+    let eye = vector("eye", &spec.eye, axis(count - 1))?;
+    let target = vector("target", &spec.target, vec![0.0; count])?;
     let back: Vec<f64> = eye.iter().zip(&target).map(|(e, t)| e - t).collect();
     let Some(back) = normalised(&back) else {
         let key = if spec.target.is_some() { "target" } else { "eye" };
@@ -71,11 +74,11 @@ pub(super) fn plan(
     };
     let frame = vec![frame[0].clone(), up_part];
     let over = match (dimension, &spec.over) {
-        (3, None) => None,
-        (3, Some(_)) => {
+        (Dimension::Three, None) => None,
+        (Dimension::Three, Some(_)) => {
             return Err(Invalid::new(format!("{path}.over"), "a 3D scene has no direction over; take the key out"));
         }
-        _ => {
+        (Dimension::Four, _) => {
             let over = vector("over", &spec.over, axis(2))?;
             if independent(&over, &frame).is_none() {
                 let plane = "the plane of the line of sight and `up`";
@@ -96,8 +99,8 @@ pub(super) fn plan(
             unused("height", spec.height, "perspective");
             let field_of_view = spec.field_of_view.unwrap_or(90.0);
             // The tangent of half the angle scales the image, so the bounds themselves have no image.
-            if !(1e-3..=180.0 - 1e-3).contains(&field_of_view) {
-                let message = format!("expected degrees above 0 and below 180, found {field_of_view}");
+            if !(0.001..=179.999).contains(&field_of_view) {
+                let message = format!("expected 0.001 to 179.999 degrees, found {}", number(field_of_view));
                 return Err(Invalid::new(format!("{path}.field_of_view"), message));
             }
             ProjectionPlan::Perspective { field_of_view }
@@ -161,9 +164,9 @@ fn dependent(path: &str, key: &str, given: bool, within: &str, frame: &[Vec<f64>
 mod tests {
     use super::*;
 
-    fn camera(yaml: &str, dimension: usize) -> Result<CameraPlan, String> {
+    fn camera(yaml: &str, dimension: u64) -> Result<CameraPlan, String> {
         let spec: CameraSpec = crate::pipeline::Document::parse("c.yaml", yaml).unwrap().decode().unwrap();
-        plan(&spec, "camera", dimension, &mut Vec::new()).map_err(|e| e.to_string())
+        plan(&spec, "camera", Dimension::new(dimension).unwrap(), &mut Vec::new()).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -183,8 +186,8 @@ mod tests {
             ("{eye: [0, 0, 1]}", 4, "camera.eye: expected 4 numbers (the scene is 4D), found 3"),
             ("{eye: [0, 0, 1, 1e13]}", 4, "camera.eye[3]: expected a number of size up to 1e12, found 1e13"),
             ("{eye: [0, 0, 0, 0]}", 4, "camera.eye: `eye` and `target` are the same point; move one of them"),
-            ("{field_of_view: 180}", 4, "camera.field_of_view: expected degrees above 0 and below 180, found 180"),
-            ("{field_of_view: 0}", 3, "camera.field_of_view: expected degrees above 0 and below 180, found 0"),
+            ("{field_of_view: 180}", 4, "camera.field_of_view: expected 0.001 to 179.999 degrees, found 180"),
+            ("{field_of_view: 0}", 3, "camera.field_of_view: expected 0.001 to 179.999 degrees, found 0"),
             ("{projection: parallel, height: -1}", 3, "camera.height: expected a number above 0, found -1"),
             ("{over: [0, 0, 1]}", 3, "camera.over: a 3D scene has no direction over; take the key out"),
             (

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::{Serialize, Serializer};
 
 use super::{OcclusionPlan, OcclusionSource, Plan, ProjectionPlan, RenderPlan, Samples, StageRef, WritePlan};
+use crate::geometry::Dimension;
 use crate::pipeline::spec::{Compression, Projection, Shading};
 
 /// How much is in a scene, once it is built.
@@ -161,7 +162,10 @@ impl Description<'_> {
             ProjectionPlan::Perspective { field_of_view } => format!("perspective {field_of_view} degrees"),
             ProjectionPlan::Parallel { height } => format!("parallel, height {height}"),
         };
-        let extent = if scene.dimension == 3 { format!("{x} x {y}") } else { format!("{x} x {y} x {z}") };
+        let extent = match scene.dimension {
+            Dimension::Three => format!("{x} x {y}"),
+            Dimension::Four => format!("{x} x {y} x {z}"),
+        };
         let voxels = grouped(render.voxels());
         format!("{} {with}: {extent} = {voxels} voxels, {}, {projection}", scene.id, render.shading.as_str())
     }

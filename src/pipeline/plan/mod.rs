@@ -30,6 +30,7 @@ pub use describe::{Description, SceneCounts, grouped, size};
 use super::Cut;
 use super::error::Invalid;
 use super::spec::{Channel, Compression, Encoding, Method, ObjectSpec, PipelineSpec, Reader, Shading, Visibility};
+use crate::geometry::Dimension;
 /// The most samples a vertex.
 pub const MAX_SAMPLES: u64 = 1 << 24;
 /// The most pieces that a vertex's view may be cut into.
@@ -40,6 +41,8 @@ pub const MAX_DIMENSION: u64 = 65_535;
 pub const MAX_OBJECTS: usize = 65_535;
 /// Coordinates and lengths beyond this are refused: their squares must stay far inside `f32`.
 pub const MAX_LENGTH: f64 = 1e12;
+/// No length that must be above zero may be below this.
+pub const MIN_LENGTH: f64 = 1e-12;
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, Serialize)]
@@ -167,8 +170,8 @@ pub struct ScenePlan {
     /// Where it is written, for complaints: `stages[0].scene`.
     #[serde(skip)]
     pub path: String,
-    /// 3 or 4.
-    pub dimension: usize,
+    /// The space it is in.
+    pub dimension: Dimension,
     /// What is in it; in JSON, how many.
     #[serde(serialize_with = "describe::count")]
     pub objects: Vec<ObjectSpec>,

@@ -2,6 +2,7 @@
 
 use super::resolve::Resolver;
 use super::{MAX_DIMENSION, NO_SCENE, OcclusionSource, RenderPlan, StageRef, camera};
+use crate::geometry::Dimension;
 use crate::pipeline::error::Invalid;
 use crate::pipeline::spec::{Method, RenderSpec, Shading};
 
@@ -90,15 +91,15 @@ fn scene_and_occlusion(resolver: &Resolver, path: &str, spec: &RenderSpec) -> Re
     }
 }
 
-fn dimensions(path: &str, given: &[u64], dimension: usize) -> Result<[usize; 3], Invalid> {
+fn dimensions(path: &str, given: &[u64], dimension: Dimension) -> Result<[usize; 3], Invalid> {
     let three = match (dimension, given) {
-        (3, &[x, y]) | (3, &[x, y, 1]) => [x, y, 1],
-        (4, &[x, y, z]) => [x, y, z],
-        (3, _) => {
+        (Dimension::Three, &[x, y]) | (Dimension::Three, &[x, y, 1]) => [x, y, 1],
+        (Dimension::Four, &[x, y, z]) => [x, y, z],
+        (Dimension::Three, _) => {
             let message = format!("expected [WIDTH, HEIGHT] for a 3D scene, found {given:?}");
             return Err(Invalid::new(path, message));
         }
-        _ => {
+        (Dimension::Four, _) => {
             let message = format!("expected [WIDTH, HEIGHT, DEPTH] for a 4D scene, found {given:?}");
             return Err(Invalid::new(path, message));
         }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Errors;
 use super::ladder::{Bench, Truth};
 use crate::accel::Tracer;
-use crate::geometry::{Aabb, Ray, Vector, Vector64, narrow, widen};
+use crate::geometry::{Aabb, Dimension, Ray, Vector, Vector64, narrow, widen};
 use crate::occlusion::{Cancelled, Deviations, plain_cramer};
 use crate::pipeline::RunError;
 use crate::progress::Progress;
@@ -80,10 +80,9 @@ pub fn differing<const D: usize>(
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Vec<Differing>, RunError> {
-    let aims: &[(&str, usize)] = if D == 4 {
-        &[("inside tetrahedra", 0), ("on triangles", 3), ("on edges", 2), ("at vertices", 1)]
-    } else {
-        &[("inside triangles", 0), ("on edges", 2), ("at vertices", 1)]
+    let aims: &[(&str, usize)] = match Dimension::of::<D>() {
+        Dimension::Three => &[("inside triangles", 0), ("on edges", 2), ("at vertices", 1)],
+        Dimension::Four => &[("inside tetrahedra", 0), ("on triangles", 3), ("on edges", 2), ("at vertices", 1)],
     };
     let bounds = tracer.mesh().bounds();
     progress.begin("study: precision", (aims.len() * RAYS) as u64);

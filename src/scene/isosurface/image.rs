@@ -15,6 +15,7 @@ use super::super::Error;
 use super::super::numbers::{AXES, OneOrEach, point, subdivisions};
 use super::march::Layers;
 use super::{MOST_IN_LAYER, Seen, Side, check_grid};
+use crate::geometry::Dimension;
 use crate::io::image::{self, ByteOrder, Frame, Number, Numbers, Placement, Positions, Request, Role};
 use crate::mesh::Surface;
 
@@ -127,7 +128,7 @@ impl ImageSpec {
             axes: self.axes.clone(),
             placement: self.placement,
             space: self.space.map(|space| format!("{space:?}").to_uppercase()),
-            count_times: D == 4 && self.spacing.is_some(),
+            count_times: Dimension::of::<D>() == Dimension::Four && self.spacing.is_some(),
         })
     }
 
@@ -147,21 +148,23 @@ impl ImageSpec {
         let key = format!("{KEY}.{}", if self.file.is_some() { "file" } else { "files" });
         let image = image::open(&key, folder, &files, &self.request::<D>()?)?;
         let points = image.points();
-        let frame = match (D, self.frame, points[3]) {
-            (3, frame, frames) if frame.unwrap_or(0) >= frames => {
+        let frame = match (Dimension::of::<D>(), self.frame, points[3]) {
+            (Dimension::Three, frame, frames) if frame.unwrap_or(0) >= frames => {
                 return Err(wrong("frame", format!("there are {frames}, counted from 0")));
             }
-            (3, None, frames @ 2..) => {
+            (Dimension::Three, None, frames @ 2..) => {
                 return Err(wrong("frame", format!("the image has {frames} steps of time; say which one, from 0")));
             }
-            (3, frame, _) => frame.unwrap_or(0),
-            (_, Some(_), _) => return Err(wrong("frame", "only a scene of dimension 3 takes a single frame".into())),
-            _ => 0,
+            (Dimension::Three, frame, _) => frame.unwrap_or(0),
+            (Dimension::Four, Some(_), _) => {
+                return Err(wrong("frame", "only a scene of dimension 3 takes a single frame".into()));
+            }
+            (Dimension::Four, None, 1) => {
+                let message = "the image has one step of time only; take dimension: 3, files, or dimensions";
+                return Err(Error::invalid(KEY, message));
+            }
+            (Dimension::Four, None, _) => 0,
         };
-        if D == 4 && points[3] == 1 {
-            let message = "the image has one step of time only; take dimension: 3, files, or dimensions";
-            return Err(Error::invalid(KEY, message));
-        }
         notes.extend(image.notes.iter().map(|note| format!("{KEY}: {note}")));
         let mut positions: [Positions; D] = std::array::from_fn(|axis| image.axes[axis].positions.clone());
         let mut placed = image.frame.as_ref().map(Placed::new).transpose()?;
@@ -202,7 +205,7 @@ impl ImageSpec {
         let slice = points[0] as u64 * points[1] as u64;
         let layers = ImageLayers {
             values: image.values,
-            skip: slice * (frame * points[2] + from[D - 1] * if D == 4 { points[2] } else { 1 }) as u64,
+            skip: slice * (frame * points[2] + from[D - 1] * slices_a_layer::<D>(&points)) as u64,
             points: std::array::from_fn(|axis| points[axis]),
             from,
             to,
@@ -350,6 +353,14 @@ fn kernel(sigma: f64) -> Vec<f64> {
     (0..=reach).map(|i| if i == 0 { 1.0 } else { libm::exp(-0.5 * (f64::from(i) / sigma).powi(2)) }).collect()
 }
 
+/// How many slices of an image one layer of the grid is: one in 3D, in 4D a whole step of time.
+fn slices_a_layer<const D: usize>(points: &[usize]) -> usize {
+    match Dimension::of::<D>() {
+        Dimension::Three => 1,
+        Dimension::Four => points[2],
+    }
+}
+
 /// An image, layer by layer.
 pub struct ImageLayers<const D: usize> {
     values: Box<dyn Numbers>,
@@ -392,8 +403,8 @@ impl<const D: usize> ImageLayers<D> {
         let window = Window::of(self);
         let (sizes, factors, sign, isovalue) = (self.sizes, self.factors, self.sign, self.isovalue);
         for _ in 0..factors[D - 1] {
-            for z in 0..if D == 4 { self.points[2] } else { 1 } {
-                let Some(z) = (if D == 4 { self.place(2, z) } else { Some(0) }) else {
+            for z in 0..slices_a_layer::<D>(&self.points) {
+                let Some(z) = self.place_in_layer(z) else {
                     self.values.skip(window.all())?;
                     continue;
                 };
@@ -428,12 +439,12 @@ impl<const D: usize> ImageLayers<D> {
         let mut layer = vec![0f32; size];
         let window = Window::of(self);
         let (isovalue, sign) = (self.isovalue, self.sign);
-        for z in 0..if D == 4 { self.points[2] } else { 1 } {
-            let Some(z) = (if D == 4 { self.place(2, z) } else { Some(0) }) else {
+        for z in 0..slices_a_layer::<D>(&self.points) {
+            let Some(z) = self.place_in_layer(z) else {
                 self.values.skip(window.all())?;
                 continue;
             };
-            let slots = if D == 4 { &mut layer[z * area..][..area] } else { &mut layer[..] };
+            let slots = &mut layer[z * area..][..area];
             window.read(&mut *self.values, |first, rows| {
                 let count = rows.values.len() / rows.stride;
                 let slots = &mut slots[first * width..][..count * width];
@@ -452,6 +463,14 @@ impl<const D: usize> ImageLayers<D> {
     fn place(&self, axis: usize, index: usize) -> Option<usize> {
         let place = index.checked_sub(self.from[axis])? / self.factors[axis];
         (index < self.to[axis] && place < self.sizes[axis]).then_some(place)
+    }
+
+    /// The same for a slice within a layer. In 3D a layer is one slice.
+    fn place_in_layer(&self, z: usize) -> Option<usize> {
+        match Dimension::of::<D>() {
+            Dimension::Three => Some(z),
+            Dimension::Four => self.place(2, z),
+        }
     }
 
     /// The next layer, smoothed within itself.

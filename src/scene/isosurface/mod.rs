@@ -26,6 +26,7 @@ use self::march::{Layers, Stop};
 use super::Error;
 use super::lattice::divide;
 use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, finite};
+use crate::geometry::Dimension;
 use crate::mesh::Surface;
 use crate::volume::available_memory;
 
@@ -141,7 +142,7 @@ impl IsosurfaceSpec {
     fn of_formula<const D: usize>(&self, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         let isovalue = finite("isosurface.isovalue", self.isovalue.unwrap_or(0.0))?;
         let inside = self.inside.unwrap_or(Side::Below);
-        let definition = self.field.define(D)?;
+        let definition = self.field.define(Dimension::of::<D>())?;
         let formula_key = format!("isosurface.field.{}", self.field.key());
         let expression = Expression::parse(&definition.formula, &AXES[..D])
             .map_err(|message| Error::invalid(&formula_key, message))?;

@@ -30,7 +30,7 @@ pub(super) struct Directories {
 impl Directories {
     pub fn read(path: &Path) -> Result<Self, String> {
         let cut = |e: std::io::Error| format!("is cut off, or no TIFF file: {e}");
-        let mut file = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
+        let mut file = BufReader::new(crate::input::open(path).map_err(|e| e.to_string())?);
         let mut start = [0; 8];
         file.read_exact(&mut start).map_err(cut)?;
         let little_endian = match &start[..2] {
@@ -107,7 +107,7 @@ pub(super) struct Grey {
 
 impl Grey {
     pub fn open(path: &Path, directories: &Directories) -> Result<Self, String> {
-        let file = BufReader::with_capacity(1 << 16, File::open(path).map_err(|e| e.to_string())?);
+        let file = BufReader::with_capacity(1 << 16, crate::input::open(path).map_err(|e| e.to_string())?);
         Ok(Self { file, at: 0, little_endian: directories.little_endian, patches: directories.patches.clone() })
     }
 }
