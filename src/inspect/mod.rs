@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | `.vti`, `.vtu`, `.vtp`, `.vtk` | an image or a mesh, as [`crate::io::vtk`] reads it |
 //! | `.stl`, `.obj`, `.ply`, `.msh` | a mesh, with the cells that the file has |
+//! | `.nii`, `.nrrd`, `.nc`, `.tif` | an image, described but not compared ([`image`]) |
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
 //! | `.raw` | colours without a header: only how many |
 //!
@@ -15,6 +16,7 @@
 
 pub mod compare;
 mod error;
+pub mod image;
 mod info;
 mod range;
 pub mod surface;

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use self::expression::{Expression, Rows};
 use self::field::Field;
-use self::image::ImageSpec;
+use self::image::{Grid, ImageSpec};
 use self::march::{Layers, Stop};
 use super::Error;
 use super::lattice::divide;
@@ -129,8 +129,8 @@ impl IsosurfaceSpec {
             return Err(Error::invalid("isosurface", "an image needs an isovalue: the value that the surface is at"));
         };
         let isovalue = finite("isosurface.isovalue", isovalue)?;
-        let (mut layers, axes) = image.open::<D>(folder, isovalue, self.inside.unwrap_or(Side::Above))?;
-        check_grid("isosurface.field.image", &axes.each_ref().map(|axis| axis.len() as u128))?;
+        let inside = self.inside.unwrap_or(Side::Above);
+        let Grid { mut layers, axes, placed } = image.open::<D>(folder, isovalue, inside, notes)?;
         if let Some(axis) = axes.iter().position(|axis| axis.len() < 2).filter(|_| !self.pad) {
             let message = format!("the image has one point along {}; it needs two, or pad: true", AXES[axis]);
             return Err(Error::invalid("isosurface.pad", message));
@@ -139,6 +139,9 @@ impl IsosurfaceSpec {
         let mut surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut layers, progress);
         if let (Ok(surface), 1) = (&mut surface, backwards % 2) {
             surface.simplices.iter_mut().for_each(|simplex| simplex.swap(D - 2, D - 1));
+        }
+        if let (Ok(surface), Some(placed)) = (&mut surface, placed) {
+            placed.apply(surface);
         }
         finish(surface, &layers.seen, isovalue, self.smallest_component, notes)
     }
