@@ -34,7 +34,11 @@ pub fn read(bytes: &[u8]) -> Result<UnstructuredGrid, String> {
         };
     }
     let mut mesh = Mesh::default();
-    if old { mesh.version_2(&mut file)? } else { mesh.version_4(&mut file)? }
+    if old {
+        mesh.version_2(&mut file)?
+    } else {
+        mesh.version_4(&mut file)?
+    }
     Ok(mesh.grid)
 }
 
@@ -61,7 +65,8 @@ impl<'a> File<'a> {
             let start = from + found;
             let begins = start == 0 || self.bytes[start - 1].is_ascii_whitespace();
             let rest = &self.bytes[start..];
-            if begins && rest.starts_with(name.as_bytes()) && rest.get(name.len()).is_some_and(u8::is_ascii_whitespace) {
+            if begins && rest.starts_with(name.as_bytes()) && rest.get(name.len()).is_some_and(u8::is_ascii_whitespace)
+            {
                 self.at = start + name.len();
                 self.skip_line();
                 return Ok(());

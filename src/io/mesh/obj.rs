@@ -87,7 +87,8 @@ mod tests {
 
     #[test]
     fn only_vertices_and_cells_are_read() {
-        let text = b"mtllib \xe4.mtl\nusemtl \no \xff\nv 0 0 0 1 .5 .5 .5\nv 1. 0 +0\r\nv 1e0 1 0 # corner\nvn x y z\nvt\n\
+        let text =
+            b"mtllib \xe4.mtl\nusemtl \no \xff\nv 0 0 0 1 .5 .5 .5\nv 1. 0 +0\r\nv 1e0 1 0 # corner\nvn x y z\nvt\n\
             s off\nf 1/2/3 2//7 \\\n 3/\nf -3 -2 -1\nl 1 2 3\nl 1 2\np 1 2\nv 0 1 0\nf 1 2 3 4 # quad\ncstype bezier\n";
         let grid = read(text).unwrap();
         assert_eq!(grid.points, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);

@@ -75,7 +75,11 @@ fn clip(flat: &[[f64; 2]]) -> Option<Vec<[u32; 3]>> {
     let place = |i: u32| flat[i as usize];
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     for t in cut.chunks_exact(3) {
-        triangles.push(if area(place(t[0]), place(t[1]), place(t[2])) < 0.0 { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] });
+        triangles.push(if area(place(t[0]), place(t[1]), place(t[2])) < 0.0 {
+            [t[0], t[2], t[1]]
+        } else {
+            [t[0], t[1], t[2]]
+        });
     }
     let mut kept = vec![false; flat.len()];
     triangles.iter().flatten().for_each(|&i| kept[i as usize] = true);
@@ -97,9 +101,10 @@ fn clip(flat: &[[f64; 2]]) -> Option<Vec<[u32; 3]>> {
             break;
         }
     }
-    let (whole, sum) = ((1..n - 1).map(|i| area(flat[0], place(i), place(i + 1))).sum::<f64>(), |all: &[[u32; 3]]| {
-        all.iter().map(|t| area(place(t[0]), place(t[1]), place(t[2])).abs()).sum::<f64>()
-    });
+    let (whole, sum) =
+        ((1..n - 1).map(|i| area(flat[0], place(i), place(i + 1))).sum::<f64>(), |all: &[[u32; 3]]| {
+            all.iter().map(|t| area(place(t[0]), place(t[1]), place(t[2])).abs()).sum::<f64>()
+        });
     (triangles.len() == flat.len() - 2 && (sum(&triangles) - whole).abs() <= 1e-9 * whole.abs()).then_some(triangles)
 }
 

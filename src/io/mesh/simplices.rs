@@ -99,7 +99,9 @@ fn exactly<const N: usize>(i: usize, kind: u8, points: &[u32]) -> Result<[u32; N
 
 fn refused(i: usize, kind: u8) -> String {
     let (name, tool) = (cell_name(kind), if dimension(kind) == 2 { "Triangulate" } else { "Tetrahedralize" });
-    format!("cell {i} is a {name}, which is not understood; ParaView's {tool} divides it, and a mesher's order 1 avoids it")
+    format!(
+        "cell {i} is a {name}, which is not understood; ParaView's {tool} divides it, and a mesher's order 1 avoids it"
+    )
 }
 
 #[cfg(test)]

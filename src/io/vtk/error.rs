@@ -30,7 +30,9 @@ pub enum Problem {
     #[error("the file is empty; write it again")]
     Empty,
     /// Not a VTK file.
-    #[error("not a VTK file: it begins with {found:?}, where `<?xml`, `<VTKFile` or `# vtk DataFile Version` was expected")]
+    #[error(
+        "not a VTK file: it begins with {found:?}, where `<?xml`, `<VTKFile` or `# vtk DataFile Version` was expected"
+    )]
     Foreign {
         /// Its first characters.
         found: String,
@@ -97,7 +99,9 @@ pub enum Problem {
         cause: String,
     },
     /// An array that memory has no room for.
-    #[error("array `{array}` takes {needed} bytes, and there is room for {free}; leave it out of the file, or take fewer points")]
+    #[error(
+        "array `{array}` takes {needed} bytes, and there is room for {free}; leave it out of the file, or take fewer points"
+    )]
     Memory {
         /// The array.
         array: String,

@@ -179,7 +179,10 @@ impl Parts {
             && spacing.iter().all(|&x| x.is_finite() && x > 0.0);
         let grid = Grid { dimensions: self.dimensions, origin: self.origin, spacing };
         let (Some(points), true) = (grid.checked_len(), usable) else {
-            return Err(wrong(format!("has dimensions {:?} and spacing {spacing:?}, which make no sense", self.dimensions)));
+            return Err(wrong(format!(
+                "has dimensions {:?} and spacing {spacing:?}, which make no sense",
+                self.dimensions
+            )));
         };
         let cells: usize = self.dimensions.iter().map(|n| (n - 1).max(1)).product();
         for (arrays, tuples) in [(&self.point_arrays, points), (&self.cell_arrays, cells)] {
@@ -268,9 +271,7 @@ impl<'a> File<'a> {
     /// The type of numbers that comes next.
     fn kind(&mut self) -> Result<Kind, Problem> {
         let word = self.needed()?;
-        kind(word).ok_or_else(|| {
-            wrong(format!("holds numbers of type \"{}\", which is not understood", brief(word)))
-        })
+        kind(word).ok_or_else(|| wrong(format!("holds numbers of type \"{}\", which is not understood", brief(word))))
     }
 
     /// Up to the next empty line.
@@ -406,7 +407,8 @@ impl<'a> File<'a> {
             let first = *self.rest().first().ok_or_else(|| wrong("is cut off"))?;
             let bytes = [8, 4, 2, 1][usize::from(first >> 6)];
             let head = self.rest().get(..bytes).ok_or_else(|| wrong("is cut off"))?;
-            let length = head.iter().enumerate().fold(0u64, |n, (i, &b)| n << 8 | u64::from(if i == 0 { b & 63 } else { b }));
+            let length =
+                head.iter().enumerate().fold(0u64, |n, (i, &b)| n << 8 | u64::from(if i == 0 { b & 63 } else { b }));
             self.at += bytes;
             let string = usize::try_from(length).ok().and_then(|n| self.rest().get(..n));
             let string = string.ok_or_else(|| wrong("is cut off within a string"))?;

@@ -2,11 +2,11 @@
 
 use roxmltree::Node;
 
+use super::Field;
 use super::Problem;
+use super::cell::{self, POLYHEDRON, TETRAHEDRON, TRIANGLE};
 use super::data_array::{array, attributes, field_data};
 use super::document::{Document, child, required};
-use super::Field;
-use super::cell::{self, POLYHEDRON, TETRAHEDRON, TRIANGLE};
 use crate::volume::{Array, Values};
 
 /// Points, and cells that are lists of points.
@@ -122,9 +122,12 @@ pub(super) fn read(document: &Document<'_>) -> Result<UnstructuredGrid, Problem>
         }
     } else {
         // In the order in which VTK numbers the cells.
-        for (element, number) in
-            [("Verts", "NumberOfVerts"), ("Lines", "NumberOfLines"), ("Polys", "NumberOfPolys"), ("Strips", "NumberOfStrips")]
-        {
+        for (element, number) in [
+            ("Verts", "NumberOfVerts"),
+            ("Lines", "NumberOfLines"),
+            ("Polys", "NumberOfPolys"),
+            ("Strips", "NumberOfStrips"),
+        ] {
             let n = if piece.has_attribute(number) { count(piece, number)? } else { 0 };
             if n == 0 {
                 continue;
