@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// From the ground up; modules on one floor don't know each other.
 const FLOORS: &[&[&str]] = &[
-    &["geometry", "progress"],
+    &["geometry", "input", "progress", "text"],
     &["volume", "mesh"],
     &["io"],
     &["scene", "accel"],

@@ -552,6 +552,7 @@ fn meshes_from_obj_msh_and_vtk() {
     write("types.vtk", &text.replace("CELL_TYPES 2\n10\n5\n", "CELL_TYPES 1\n10\n"));
     write("many.vtk", &text.replace("POINTS 4", "POINTS 6000000000000000000"));
     write("image.vtk", &text.replace("UNSTRUCTURED_GRID", "STRUCTURED_POINTS"));
+    write("grid.vtk", &text.replace("UNSTRUCTURED_GRID", "STRUCTURED_GRID"));
     for name in ["two.msh", "four.msh", "old.vtk", "new.vtk"] {
         let surface = extruded(name).unwrap();
         assert_closed_manifold(&surface);
@@ -569,7 +570,7 @@ fn meshes_from_obj_msh_and_vtk() {
     near(volume(&cube), 1.0, 1e-15);
     write("bad.obj", "v 0 0 0\nf 1 2 3\n");
     write("words.obj", "v 0 0 x\nf 1 1 1\n");
-    write("quads.msh", &second.replace("9 4 2 0 1 7 3 12 5", "9 5 2 0 1 7 3 12 5 7 3 12 5"));
+    write("quads.msh", &second.replace("9 4 2 0 1 7 3 12 5", "9 11 2 0 1 7 3 12 5 7 3 12 5 7 3"));
     write("gap.msh", &second.replace("7 3 12 5\n", "7 3 12 6\n"));
     write("binary.msh", "$MeshFormat\n4.1 1 8\n");
     write("old.msh", "$MeshFormat\n1 0 8\n");
@@ -578,17 +579,18 @@ fn meshes_from_obj_msh_and_vtk() {
     for (name, message) in [
         ("bad.obj", "is damaged, or no OBJ file"),
         ("words.obj", "is damaged, or no OBJ file"),
-        ("quads.msh", "holds 1 solid elements that are no tetrahedra"),
+        ("quads.msh", "cell 2 is a curved tetrahedron"),
         ("gap.msh", "has an element with node 6, which is not there"),
-        ("binary.msh", "is binary; save it as text"),
+        ("binary.msh", "is cut off"),
         ("old.msh", "is of version 1; 2.2 and 4.1"),
         ("cut.msh", "is cut off"),
         ("none.msh", "has no $MeshFormat"),
         ("cut.vtk", "is cut off"),
-        ("hex.vtk", "has a cell of type 12, which is not understood"),
+        ("hex.vtk", "cell 0 is a hexahedron of 4 points"),
         ("types.vtk", "has 2 cells and 1 types of cells"),
         ("many.vtk", "is cut off: it declares more numbers than there are"),
-        ("image.vtk", "holds STRUCTURED_POINTS; UNSTRUCTURED_GRID and POLYDATA are understood"),
+        ("image.vtk", "has dimensions [0, 0, 0]"),
+        ("grid.vtk", "STRUCTURED_GRID cannot be read here; UNSTRUCTURED_GRID, POLYDATA"),
     ] {
         let found = extruded(name).unwrap_err().to_string();
         assert!(found.contains(message) && found.contains(name), "{found}");

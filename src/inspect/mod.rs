@@ -5,8 +5,8 @@
 //!
 //! | file | read as |
 //! | --- | --- |
-//! | `.vti`, `.vtu`, `.vtp` | an image or a mesh, as [`crate::io::vtk`] reads it |
-//! | `.stl`, `.ply` | a mesh of triangles, as a scene would take it |
+//! | `.vti`, `.vtu`, `.vtp`, `.vtk` | an image or a mesh, as [`crate::io::vtk`] reads it |
+//! | `.stl`, `.obj`, `.ply`, `.msh` | a mesh, with the cells that the file has |
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
 //! | `.raw` | colours without a header: only how many |
 //!
@@ -26,8 +26,7 @@ pub use info::{Description, Info};
 pub use range::{ArraySummary, Range};
 
 use self::compare::{Comparison, Tolerance};
-use crate::io::mesh::{Cells, FileMesh};
-use crate::io::vtk::{self, DataSet, Image, TETRAHEDRON, TRIANGLE, UnstructuredGrid};
+use crate::io::vtk::{self, DataSet, Image, UnstructuredGrid, Wanted};
 use crate::io::{Input, InputError};
 use crate::occlusion::{self, Sidecar};
 use crate::volume::{Array, Kind, Values};
@@ -60,7 +59,7 @@ impl Contents {
         match ending.as_str() {
             "f32" => occlusion_file(path),
             "raw" => numbers(path, 12, "colours are three floats of four bytes each").map(Self::Raw),
-            "stl" | "ply" => triangles(path).map(Self::Mesh),
+            "stl" | "ply" | "obj" | "msh" => mesh(path).map(Self::Mesh),
             "vti" | "vtu" | "vtp" | "vtk" | "xml" => Ok(match vtk::read(path)? {
                 DataSet::Image(image) => Self::Image(image),
                 DataSet::Unstructured(mesh) => Self::Mesh(mesh),
@@ -117,7 +116,7 @@ pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, 
 
 /// All floats of a file whose length is a multiple of `unit` bytes.
 fn numbers(path: &Path, unit: usize, why: &'static str) -> Result<Values, Error> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     if bytes.is_empty() || bytes.len() % unit != 0 {
         return Err(Error::Length { path: path.into(), found: bytes.len(), unit, why });
     }
@@ -132,8 +131,8 @@ fn occlusion_file(path: &Path) -> Result<Contents, Error> {
     if !beside.exists() {
         return Ok(Contents::Occlusion(numbers(path, 4, "values are floats of four bytes each")?, None));
     }
-    let text = std::fs::read_to_string(beside).map_err(|cause| Error::Open { path: beside.into(), cause })?;
-    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let text = crate::input::read_text(beside).map_err(|cause| Error::Open { path: beside.into(), cause })?;
+    let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     let damaged = |cause| Error::Occlusion { path: path.into(), cause };
     let sidecar = Sidecar::from_yaml(&text).map_err(damaged)?;
     let values = occlusion::decode(&bytes, sidecar.count).map_err(damaged)?;
@@ -141,27 +140,10 @@ fn occlusion_file(path: &Path) -> Result<Contents, Error> {
 }
 
 /// A mesh from a file that isn't VTK's.
-fn triangles(path: &Path) -> Result<UnstructuredGrid, Error> {
-    let mesh = Input::new("", Path::new(""), path).read().map_err(|error| match error {
+fn mesh(path: &Path) -> Result<UnstructuredGrid, Error> {
+    Input::new("", Path::new(""), path).read_cells(Wanted::All).map_err(|error| match error {
         InputError::Unreadable { path, source, .. } => Error::Open { path, cause: source },
         InputError::Content { path, message, .. } => Error::Mesh { path, message },
         InputError::Invalid { message, .. } => Error::Mesh { path: path.into(), message },
-    })?;
-    Ok(grid(mesh))
-}
-
-fn grid(FileMesh { points, cells, point_arrays }: FileMesh) -> UnstructuredGrid {
-    let (connectivity, size, kind) = match cells {
-        Cells::Triangles(cells) => (cells.into_flattened(), 3, TRIANGLE),
-        Cells::Tetrahedra(cells) => (cells.into_flattened(), 4, TETRAHEDRON),
-    };
-    let count = connectivity.len() / size;
-    UnstructuredGrid {
-        points: points.into_iter().map(Into::into).collect(),
-        connectivity,
-        offsets: (1..=count).map(|i| i * size).collect(),
-        types: vec![kind; count],
-        point_arrays: point_arrays.into_iter().map(|a| Array::new(a.name, a.components, a.values)).collect(),
-        ..UnstructuredGrid::default()
-    }
+    })
 }

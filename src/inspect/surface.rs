@@ -11,7 +11,8 @@ use serde::Serialize;
 
 use super::range::Short;
 use crate::geometry::{Vector64, is_degenerate, narrow};
-use crate::io::vtk::{TETRAHEDRON, TRIANGLE, UnstructuredGrid};
+use crate::io::mesh::{Cells, FileMesh, PointArray, simplices};
+use crate::io::vtk::UnstructuredGrid;
 use crate::mesh::identity::identities;
 use crate::mesh::topology::{
     components, corners, enclosed_volume, f_vector, facet_pairs, singular_vertices, surface_measure, worst_quality,
@@ -78,32 +79,28 @@ pub struct SurfaceSummary {
 }
 
 impl SurfaceSummary {
-    /// Of a mesh that consists of simplices alone, in the space that its points are in; nothing for any other, and
-    /// none where coordinates are missing, not finite or beyond what a scene takes.
+    /// Of a mesh, divided into simplices as a scene would, in the space that its points are in; nothing for one that can't
+    /// be divided, and none where coordinates are missing, not finite or beyond what a scene takes.
     pub fn of(mesh: &UnstructuredGrid) -> Option<Self> {
-        let all = |kind: u8| !mesh.types.is_empty() && mesh.types.iter().all(|&t| t == kind);
-        if all(TRIANGLE) {
-            let points = match positions::<3>(mesh) {
-                Some(points) => points,
-                None => mesh.points.iter().map(|&p| p.into()).collect(),
-            };
-            Self::new(Form::SurfaceIn3d, &points, &mesh.simplices::<3>().ok()?)
-        } else if all(TETRAHEDRON) {
-            let simplices = mesh.simplices::<4>().ok()?;
-            match positions::<4>(mesh) {
-                Some(points) => Self::new(Form::SurfaceIn4d, &points, &simplices),
-                None => {
-                    let flat = |&[x, y, z]: &[f64; 3]| Vector64::from([x, y, z, 0.0]);
-                    Self::new(Form::SolidIn3d, &mesh.points.iter().map(flat).collect::<Vec<_>>(), &simplices)
-                }
+        let mesh = simplices(mesh).ok()?;
+        match &mesh.cells {
+            Cells::Triangles(triangles) => {
+                let points = positions::<3>(&mesh).unwrap_or_else(|| mesh.points.clone());
+                Self::new(Form::SurfaceIn3d, &points, triangles)
             }
-        } else {
-            None
+            Cells::Tetrahedra(tetrahedra) => match positions::<4>(&mesh) {
+                Some(points) => Self::new(Form::SurfaceIn4d, &points, tetrahedra),
+                None => {
+                    let flat = |p: &Vector64<3>| Vector64::from([p[0], p[1], p[2], 0.0]);
+                    Self::new(Form::SolidIn3d, &mesh.points.iter().map(flat).collect::<Vec<_>>(), tetrahedra)
+                }
+            },
         }
     }
 
     fn new<const D: usize>(form: Form, points: &[Vector64<D>], simplices: &[[u32; D]]) -> Option<Self> {
-        if points.iter().flatten().any(|x| x.is_nan() || x.abs() > LARGEST) {
+        let out_of_range = simplices.as_flattened().iter().any(|&v| v as usize >= points.len());
+        if out_of_range || points.iter().flatten().any(|x| x.is_nan() || x.abs() > LARGEST) {
             return None;
         }
         let rounded: Vec<_> = points.iter().map(narrow).collect();
@@ -141,9 +138,10 @@ impl SurfaceSummary {
 }
 
 /// The points' coordinates from the array `position`, if there is one of D components.
-fn positions<const D: usize>(mesh: &UnstructuredGrid) -> Option<Vec<Vector64<D>>> {
-    let array = mesh.point_array("position").filter(|a| a.components == D && a.tuples() == mesh.points.len())?;
-    Some((0..array.tuples()).map(|i| Vector64::from_fn(|r, _| array.values.get(D * i + r))).collect())
+fn positions<const D: usize>(mesh: &FileMesh) -> Option<Vec<Vector64<D>>> {
+    let fits = |a: &&PointArray| a.name == "position" && a.components == D && a.values.len() == D * mesh.points.len();
+    let array = mesh.point_arrays.iter().find(fits)?;
+    Some(array.values.chunks_exact(D).map(Vector64::from_column_slice).collect())
 }
 
 impl fmt::Display for SurfaceSummary {

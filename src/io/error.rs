@@ -50,9 +50,6 @@ pub enum Error {
     /// The PNG encoder refuses.
     #[error("writing the picture failed: {0}")]
     Png(::png::EncodingError),
-    /// The mesh writer refuses.
-    #[error("writing the mesh failed: {0}")]
-    Mesh(String),
 }
 
 impl From<io::Error> for Error {

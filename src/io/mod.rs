@@ -2,9 +2,9 @@
 //!
 //! | what | formats | where |
 //! | --- | --- | --- |
-//! | meshes read | `.stl`, `.obj`, `.ply`, `.msh`, `.vtk`, `.vtu` | [`mesh`] |
+//! | meshes read | `.stl`, `.obj`, `.ply`, `.msh`, `.vtk`, `.vtp`, `.vtu` | [`mesh`] |
 //! | images read | `.vti`, `.raw`, `.nii`, `.tif`, `.nc`, `.nrrd` | [`image`] |
-//! | VTK's XML files read | `.vti`, `.vtu`, `.vtp` | [`vtk`] |
+//! | VTK's files read, as one model | `.vti`, `.vtu`, `.vtp`, legacy `.vtk` | [`vtk`] |
 //! | images written | `.vti`, `.raw`, `.png` | [`vti`], [`raw`], [`png`] |
 //! | meshes and sequences written | `.vtu`, `.pvd` | [`vtu`], [`pvd`] |
 //! | figures for ParaView written | a script that finds its images beside itself | [`paraview`] |

@@ -1,18 +1,21 @@
 //! `.vtu`, VTK's mesh file: the scene's simplices at the places where the camera sees them.
 //!
-//! The `vtkio` crate writes it, with the arrays as base64 in the XML. The mesh is in memory as a whole, and once more
-//! in the text. `vtkio` names no components and writes no field data; the points lie in ParaView's 3D, so what they
-//! were in 4D goes into a `position` array.
+//! Every array stands in the XML as base64, behind its length in 64 bits, so that whatever reads XML reads the file. The mesh
+//! is in memory as a whole, its text is not. The points lie in ParaView's 3D, so what they were in 4D goes into a `position`
+//! array.
 
 use std::io::{self, Write};
 
-use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells as VtkCells, DataArray, DataSet, ElementType, IOBuffer, Piece,
-    UnstructuredGridPiece, Version, VertexNumbers, Vtk,
-};
+use base64::engine::general_purpose::STANDARD;
+use base64::write::EncoderWriter;
 
 use super::Error;
-use crate::volume::{Array, Values};
+use super::vtk::cell::{TETRAHEDRON, TRIANGLE};
+use super::xml::escape;
+use crate::volume::{Array, Kind, Values};
+
+/// Numbers turned into bytes at a time.
+const BATCH: usize = 1 << 14;
 
 /// The cells of a mesh, as indices into its points.
 #[derive(Clone, Copy, Debug)]
@@ -36,110 +39,102 @@ pub fn write(
     cell_arrays: &[Array],
 ) -> Result<(), Error> {
     let (flat, size, kind) = match cells {
-        Cells::Triangles(c) => (c.as_flattened(), 3, CellType::Triangle),
-        Cells::Tetrahedra(c) => (c.as_flattened(), 4, CellType::Tetra),
+        Cells::Triangles(c) => (c.as_flattened(), 3, TRIANGLE),
+        Cells::Tetrahedra(c) => (c.as_flattened(), 4, TETRAHEDRON),
     };
     let count = flat.len() / size;
     if let Some(p) = flat.iter().find(|&&p| p as usize >= points.len()) {
         let (found, expected) = (format!("point {p}"), format!("one of {}", points.len()));
         return Err(Error::Shape { array: "connectivity".into(), found, expected });
     }
-    let cell_verts = VertexNumbers::XML {
-        connectivity: flat.iter().map(|&p| p.into()).collect(),
-        offsets: (1..=count).map(|i| (i * size) as u64).collect(),
-    };
-    let piece = UnstructuredGridPiece {
-        points: IOBuffer::F32(points.as_flattened().to_vec()),
-        cells: VtkCells { cell_verts, types: vec![kind; count] },
-        data: Attributes { point: attributes(point_arrays, points.len())?, cell: attributes(cell_arrays, count)? },
-    };
-    let vtk = Vtk {
-        version: Version::new_xml(1, 0),
-        title: String::new(),
-        byte_order: ByteOrder::LittleEndian,
-        data: DataSet::UnstructuredGrid { meta: None, pieces: vec![Piece::Inline(Box::new(piece))] },
-        file_path: None,
-    };
-    let mut sink = Watched { sink, failure: None };
-    let failed = |e: vtkio::Error| Error::Mesh(e.to_string());
-    if count > 0 {
-        let result = vtk.write_xml(&mut sink);
-        if let Some(cause) = sink.failure.take() {
-            return Err(cause.into());
-        }
-        result.map_err(failed)?;
-    } else {
-        // vtkio leaves out counts of zero, without which VTK reads nothing at all.
-        let mut bytes = Vec::new();
-        vtk.write_xml(&mut bytes).map_err(failed)?;
-        let points = if points.is_empty() { " NumberOfPoints=\"0\"" } else { "" };
-        let piece = format!("<Piece{points} NumberOfCells=\"0\"");
-        sink.sink.write_all(String::from_utf8_lossy(&bytes).replacen("<Piece", &piece, 1).as_bytes())?;
-    }
-    sink.flush()?;
-    Ok(())
+    check(point_arrays, points.len())?;
+    check(cell_arrays, count)?;
+    let mut file = File { sink };
+    let piece = format!("NumberOfPoints=\"{}\" NumberOfCells=\"{count}\"", points.len());
+    write!(
+        file.sink,
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
+         header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece {piece}>\n<PointData>\n"
+    )?;
+    point_arrays.iter().try_for_each(|array| file.array(array))?;
+    file.text("</PointData>\n<CellData>\n")?;
+    cell_arrays.iter().try_for_each(|array| file.array(array))?;
+    file.text("</CellData>\n<Points>\n")?;
+    let coordinates = points.as_flattened();
+    file.data("Points", Kind::F32, 3, coordinates.len(), |range, bytes| {
+        coordinates[range].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    })?;
+    file.text("</Points>\n<Cells>\n")?;
+    file.data("connectivity", Kind::I64, 1, flat.len(), |range, bytes| {
+        flat[range].iter().for_each(|&p| bytes.extend(i64::from(p).to_le_bytes()));
+    })?;
+    file.data("offsets", Kind::I64, 1, count, |range, bytes| {
+        range.for_each(|i| bytes.extend((((i + 1) * size) as i64).to_le_bytes()));
+    })?;
+    file.data("types", Kind::U8, 1, count, |range, bytes| bytes.extend(range.map(|_| kind)))?;
+    file.text("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n")?;
+    Ok(file.sink.flush()?)
 }
 
-/// A sink that keeps its first error, as vtkio hands on only a text of it.
-struct Watched<W> {
+/// A file in the making.
+struct File<W> {
     sink: W,
-    failure: Option<io::Error>,
 }
 
-impl<W: Write> Write for Watched<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.sink.write(bytes).map_err(|e| {
-            let told = io::Error::from(e.kind());
-            // An interrupted call is tried again, and is no failure.
-            if e.kind() != io::ErrorKind::Interrupted {
-                self.failure.get_or_insert(e);
-            }
-            told
+impl<W: Write> File<W> {
+    fn text(&mut self, text: &str) -> io::Result<()> {
+        self.sink.write_all(text.as_bytes())
+    }
+
+    fn array(&mut self, array: &Array) -> io::Result<()> {
+        let values: &Values = &array.values;
+        self.data(&array.name, values.kind(), array.components, values.len(), |range, bytes| {
+            values.extend_le_bytes(range, bytes);
         })
     }
 
-    fn flush(&mut self) -> io::Result<()> {
-        self.sink.flush()
+    /// One `<DataArray>` of `count` numbers, whose bytes `fill` appends by ranges of numbers.
+    fn data(
+        &mut self,
+        name: &str,
+        kind: Kind,
+        components: usize,
+        count: usize,
+        fill: impl Fn(std::ops::Range<usize>, &mut Vec<u8>),
+    ) -> io::Result<()> {
+        let (name, number) = (escape(name), kind.vtk_name());
+        let attributes = format!("type=\"{number}\" Name=\"{name}\" NumberOfComponents=\"{components}\"");
+        writeln!(self.sink, "<DataArray {attributes} format=\"binary\">")?;
+        let mut encoder = EncoderWriter::new(&mut self.sink, &STANDARD);
+        encoder.write_all(&((count * kind.size()) as u64).to_le_bytes())?;
+        let mut bytes = Vec::with_capacity(BATCH * kind.size());
+        for start in (0..count).step_by(BATCH) {
+            bytes.clear();
+            fill(start..count.min(start + BATCH), &mut bytes);
+            encoder.write_all(&bytes)?;
+        }
+        encoder.finish()?;
+        drop(encoder);
+        self.text("\n</DataArray>\n")
     }
 }
 
-/// Arrays as vtkio wants them, after the checks that it leaves out.
-fn attributes(arrays: &[Array], tuples: usize) -> Result<Vec<Attribute>, Error> {
-    let mut attributes: Vec<Attribute> = Vec::new();
-    for array in arrays {
+/// Refuses arrays that don't have a tuple for each point or cell, or a name that can't stand in a file.
+fn check(arrays: &[Array], tuples: usize) -> Result<(), Error> {
+    for (i, array) in arrays.iter().enumerate() {
         let shape = |found: String, expected: String| Error::Shape { array: array.name.clone(), found, expected };
         if array.components.checked_mul(tuples) != Some(array.values.len()) || array.components == 0 {
             let expected = format!("{tuples} tuples of {}", array.components);
             return Err(shape(format!("{} numbers", array.values.len()), expected));
         }
-        if attributes.iter().any(|a| a.name() == array.name) {
+        if arrays[..i].iter().any(|a| a.name == array.name) {
             return Err(shape("the name a second time".into(), "another name".into()));
         }
         if array.name.is_empty() || array.name.contains(|c: char| c.is_control()) {
             return Err(Error::Name { what: "the array name", name: array.name.clone() });
         }
-        attributes.push(Attribute::DataArray(DataArray {
-            name: array.name.clone(),
-            elem: ElementType::Generic(array.components as u32),
-            data: buffer(&array.values),
-        }));
     }
-    Ok(attributes)
-}
-
-fn buffer(values: &Values) -> IOBuffer {
-    match values.clone() {
-        Values::I8(v) => IOBuffer::I8(v),
-        Values::U8(v) => IOBuffer::U8(v),
-        Values::I16(v) => IOBuffer::I16(v),
-        Values::U16(v) => IOBuffer::U16(v),
-        Values::I32(v) => IOBuffer::I32(v),
-        Values::U32(v) => IOBuffer::U32(v),
-        Values::I64(v) => IOBuffer::I64(v),
-        Values::U64(v) => IOBuffer::U64(v),
-        Values::F32(v) => IOBuffer::F32(v),
-        Values::F64(v) => IOBuffer::F64(v),
-    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ pub struct Cache {
 impl Cache {
     /// Reads what is known; nothing if there is nothing, or nothing readable. With `force` nothing counts as fresh.
     pub fn open(folder: &Path, force: bool) -> Self {
-        let text = std::fs::read_to_string(folder.join(NAME)).unwrap_or_default();
+        let text = crate::input::read_text(&folder.join(NAME)).unwrap_or_default();
         Self { folder: folder.to_owned(), entries: serde_json::from_str(&text).unwrap_or_default(), force }
     }
 
@@ -150,7 +150,7 @@ fn key(parts: &impl Serialize) -> String {
 
 /// A hash over a file's content; of nothing if it can't be read, which whoever needs it will find out.
 fn content(path: &Path) -> String {
-    hex(&Sha256::digest(std::fs::read(path).unwrap_or_default()))
+    hex(&Sha256::digest(crate::input::read(path).unwrap_or_default()))
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -48,6 +48,9 @@ impl fmt::Display for Refusal {
     }
 }
 
+/// Characters of an override that a message quotes.
+const LONGEST_QUOTE: usize = 200;
+
 /// Where a value was written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
@@ -68,7 +71,10 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Place::File { file, line, column } => write!(f, "{file}:{line}:{column}"),
-            Place::Set(assignment) => write!(f, "--set {assignment}"),
+            Place::Set(assignment) => match assignment.char_indices().nth(LONGEST_QUOTE) {
+                Some((end, _)) => write!(f, "--set {}...", &assignment[..end]),
+                None => write!(f, "--set {assignment}"),
+            },
         }
     }
 }

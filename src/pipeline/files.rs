@@ -276,7 +276,7 @@ pub(super) fn beside(state: &Path, file: &Path) -> String {
 /// Whether a file holds just these bytes already.
 pub(super) fn holds(path: &Path, bytes: &[u8]) -> bool {
     std::fs::metadata(path).is_ok_and(|m| m.len() == bytes.len() as u64)
-        && std::fs::read(path).is_ok_and(|found| found == bytes)
+        && crate::input::read(path).is_ok_and(|found| found == bytes)
 }
 
 pub(super) use io::paraview;

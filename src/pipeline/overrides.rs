@@ -189,7 +189,7 @@ stages:
             ("ao=3", "`ao` is a stage; name one of its keys: ao.KEY=3"),
             ("render.dimensions[3]=7", "dimensions: the list has 3 items, so [3] is outside it"),
             ("ao.samples.x=7", "samples: is the number 4, so it has no key `x`"),
-            ("ao.samples=[1", "the value is not YAML: while parsing a flow sequence, expected ',' or ']'"),
+            ("ao.samples=[1", "the value is not YAML: unclosed bracket '['"),
             ("stages[9].render.shading=flat", "stages: the list has 3 items, so [9] is outside it"),
         ] {
             assert_eq!(after(&[assignment]).unwrap_err(), format!("--set {assignment}: {message}"));

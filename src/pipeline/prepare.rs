@@ -91,14 +91,14 @@ fn load(file: &Path, mesh: &AnyMesh) -> Result<Loaded, String> {
 pub(super) fn read_values(file: &Path, hash: &str, vertices: usize) -> Result<Loaded, String> {
     let side = sidecar_path(file);
     let unreadable = |path: &Path, cause: std::io::Error| format!("can't read {}: {cause}", path.display());
-    let text = std::fs::read_to_string(&side).map_err(|e| unreadable(&side, e))?;
-    let bytes = std::fs::read(file).map_err(|e| unreadable(file, e))?;
+    let text = crate::input::read_text(&side).map_err(|e| unreadable(&side, e))?;
+    let bytes = crate::input::read(file).map_err(|e| unreadable(file, e))?;
     let unusable = |path: &Path, cause: String| format!("can't use {}: {cause}", path.display());
     let sidecar = Sidecar::from_yaml(&text).and_then(|s| s.check(hash, vertices).map(|()| s));
     let sidecar = sidecar.map_err(|e| unusable(file, e.to_string()))?;
     let values = occlusion::decode(&bytes, vertices).map_err(|e| unusable(file, e.to_string()))?;
     let beside = errors_path(file);
-    let errors = match std::fs::read(&beside) {
+    let errors = match crate::input::read(&beside) {
         Ok(bytes) => occlusion::decode(&bytes, vertices).map_err(|e| unusable(&beside, e.to_string()))?,
         // The closed form leaves none.
         Err(_) if sidecar.error_estimate == 0.0 => vec![0.0; vertices],

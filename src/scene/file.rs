@@ -14,9 +14,10 @@ use crate::io::{Input, InputError};
 use crate::mesh::Surface;
 
 /// The surface that the file holds.
-pub fn build<const D: usize>(path: &Path, folder: &Path) -> Result<Surface<D>, InputError> {
+pub fn build<const D: usize>(path: &Path, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, InputError> {
     let input = Input::new("file", folder, path);
     let mesh = input.read()?;
+    notes.extend(mesh.notes.iter().map(|note| format!("file: {note}")));
     let position = mesh.vectors::<D>("position", &input)?;
     let normals = mesh.vectors::<D>("normal", &input)?;
     let simplices: Option<Vec<[u32; D]>> = match &mesh.cells {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use crate::geometry::{Dimension, Vector64};
+use crate::text::number;
 
 /// The axes' names, in order.
 pub const AXES: [&str; 4] = ["x", "y", "z", "w"];
@@ -56,7 +57,7 @@ pub fn finite(key: &str, x: f64) -> Result<f64, Error> {
 
 /// A number above zero.
 pub fn positive(key: &str, x: f64) -> Result<f64, Error> {
-    if x.is_finite() && x > 0.0 { Ok(x) } else { Err(Error::invalid(key, format!("{x} is not above 0"))) }
+    if x.is_finite() && x > 0.0 { Ok(x) } else { Err(Error::invalid(key, format!("{} is not above 0", number(x)))) }
 }
 
 /// The lower and upper corner of a box with an inside.

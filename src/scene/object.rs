@@ -33,7 +33,7 @@ pub struct ObjectSpec {
     #[serde(default)]
     pub simplices: Option<SimplicesSpec>,
     /// Shape: a surface from a file: `.vtu` of tetrahedra with a `position` array in 4D; `.stl`, `.obj`, `.ply`,
-    /// `.msh`, `.vtk`, `.vtu` in 3D.
+    /// `.msh`, `.vtk`, `.vtp`, `.vtu` in 3D.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// Shape: a three-dimensional mesh swept along the fourth axis.
@@ -192,7 +192,7 @@ impl Shape<'_> {
     fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
-            Shape::File(path) => Ok(file::build(path, folder)?),
+            Shape::File(path) => Ok(file::build(path, folder, notes)?),
             Shape::Extrude(spec) => spec.build(folder),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),

@@ -1,6 +1,5 @@
 //! Numbers without structure, x fastest: raw files, and what follows the headers of NIfTI and NRRD.
 
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -41,7 +40,7 @@ impl Slices for Bytes {
 
 /// The bytes of a file from an offset on; decompressed on the way if they begin as gzip does.
 pub(super) fn stream(path: &Path, offset: u64, compressed: bool) -> Result<Box<dyn Read>, String> {
-    let mut file = BufReader::with_capacity(1 << 18, File::open(path).map_err(|e| e.to_string())?);
+    let mut file = BufReader::with_capacity(1 << 18, crate::input::open(path).map_err(|e| e.to_string())?);
     file.seek(SeekFrom::Start(offset)).map_err(|e| e.to_string())?;
     Ok(if compressed { Box::new(flate2::bufread::MultiGzDecoder::new(file)) } else { Box::new(file) })
 }

@@ -144,7 +144,7 @@ pub fn open(key: &str, folder: &Path, files: &[PathBuf], request: &Request) -> R
 }
 
 fn open_one(input: &Input, request: &Request) -> Result<Image, Error> {
-    let length = std::fs::metadata(&input.path).map_err(|source| input.unreadable(source))?.len();
+    let length = crate::input::length(&input.path).map_err(|source| input.unreadable(source))?;
     if length == 0 {
         return Err(input.wrong("is empty"));
     }

@@ -11,7 +11,7 @@ use super::{Header, Held, Image, Request, counted, netcdf_header, room_for};
 
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image, String> {
     let mut magic = [0; 4];
-    let read = std::fs::File::open(path).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut magic));
+    let read = crate::input::open(path).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut magic));
     if read.is_err() || !matches!(&magic, b"CDF\x01" | b"CDF\x02") {
         let what =
             if magic[1..] == *b"HDF" { "a NetCDF-4 file; convert it: nccopy -k 64-bit-offset" } else { "foreign" };

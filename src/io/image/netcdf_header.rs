@@ -21,7 +21,7 @@ fn bytes_of(kind: u64) -> Result<u64, String> {
 /// Checks the header of a file.
 pub fn check(path: &Path) -> Result<(), String> {
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(|e| e.to_string())?;
+    let file = crate::input::open(path).map_err(|e| e.to_string())?;
     file.take(LONGEST).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
     let wide = bytes.get(3) == Some(&2);
     let mut rest = Rest(bytes.get(8..).unwrap_or_default());

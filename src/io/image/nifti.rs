@@ -2,7 +2,6 @@
 //!
 //! Spacings are taken from the header, in its own units; orientation is not, the image stays as it is stored.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -14,7 +13,8 @@ use crate::volume::Kind;
 
 pub(super) fn open(path: &Path, length: u64, _: &Request) -> Result<Image, String> {
     let mut magic = [0; 2];
-    let compressed = File::open(path).and_then(|mut f| f.read_exact(&mut magic)).is_ok() && magic == [0x1f, 0x8b];
+    let compressed =
+        crate::input::open(path).and_then(|mut f| f.read_exact(&mut magic)).is_ok() && magic == [0x1f, 0x8b];
     let mut reader = stream(path, 0, compressed)?;
     let mut bytes = [0; 348];
     reader.read_exact(&mut bytes).map_err(|e| format!("is cut off, or no NIfTI file: {e}"))?;

@@ -59,7 +59,7 @@ pub(super) fn open(path: &Path, _: u64, _: &Request) -> Result<Image, String> {
         None => (path.to_owned(), after.ok_or("is cut off: its header has no end")? as u64),
     };
     let needed = counted(points, kind.size())?;
-    let length = std::fs::metadata(&values).map_err(|e| format!("names {}: {e}", values.display()))?.len();
+    let length = crate::input::length(&values).map_err(|e| format!("names {}: {e}", values.display()))?;
     holds(needed, offset, length, compressed)?;
     let spacing = spacing(field("spacings"), field("space directions"));
     let slices = Bytes {

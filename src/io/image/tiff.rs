@@ -25,7 +25,7 @@ struct Stack {
 
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image, String> {
     let begin = || {
-        let file = File::open(path).map_err(|e| e.to_string())?;
+        let file = crate::input::open(path).map_err(|e| e.to_string())?;
         Decoder::new(BufReader::new(file)).map_err(|e| format!("is cut off, or no TIFF file: {e}"))
     };
     let mut pages = begin()?;

@@ -1,19 +1,33 @@
-//! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu`, `.vtk` and
+//! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu`, `.vtp`, `.vtk` and
 //! `.msh`.
 //!
-//! A file is read whole, so that declared sizes can be held against its length before anything is allocated. Whatever
-//! it holds, the answer is a mesh whose indices are within range and whose coordinates are finite, or an error that
-//! names the file and what is wrong with it. Orientation is that of the vertices' order; normals of STL files are ignored.
+//! Each format has a reader that takes the cells as the file has them, as VTK's model of a mesh ([`UnstructuredGrid`]): what
+//! `info` tells and `compare` compares. `simplices` makes of that what a scene takes: polygons become triangles, solid cells
+//! tetrahedra.
+//!
+//! A file is read whole, so that declared sizes can be held against its length before anything is allocated. What is not
+//! needed is not parsed. Whatever a file holds, the answer is a mesh whose indices are within range and whose coordinates are
+//! finite, or an error that names the file and what is wrong with it. Orientation is that of the vertices' order; normals of
+//! STL, OBJ and PLY files are ignored.
 
 mod msh;
 mod obj;
 mod ply;
+mod polygon;
+mod simplices;
 mod stl;
-mod vtk;
-mod vtu;
 
+use super::vtk::{DataSet, UnstructuredGrid, Wanted, parse_wanted};
 use super::{Input, InputError};
 use crate::geometry::Vector64;
+
+pub use simplices::simplices;
+
+/// The endings of the names of mesh files.
+pub const ENDINGS: [&str; 7] = ["stl", "obj", "ply", "msh", "vtk", "vtp", "vtu"];
+
+/// The arrays that a scene looks for.
+const ARRAYS: [&str; 2] = ["position", "normal"];
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +36,10 @@ pub struct FileMesh {
     pub points: Vec<Vector64<3>>,
     /// The simplices over them.
     pub cells: Cells,
-    /// What is known at each point; only `.vtu` files carry any here.
+    /// What is known at each point, of the arrays `position` and `normal`; only VTK's files carry any here.
     pub point_arrays: Vec<PointArray>,
+    /// What is allowed but worth telling.
+    pub notes: Vec<String>,
 }
 
 /// The simplices of a file, all of one kind.
@@ -66,29 +82,44 @@ impl FileMesh {
 }
 
 impl Input {
-    /// Reads the mesh, by the ending of the file's name.
+    /// Reads the mesh as simplices, by the ending of the file's name.
     pub fn read(&self) -> Result<FileMesh, InputError> {
-        let ending = self.path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let parse = match ending.as_str() {
-            "stl" => stl::read,
-            "ply" => ply::read,
-            "vtu" => vtu::read,
-            "vtk" => vtk::read,
-            "obj" => obj::read,
-            "msh" => msh::read,
-            _ => {
-                return Err(
-                    self.wrong("can't tell what it holds; the name must end in .stl, .obj, .ply, .msh, .vtk or .vtu")
-                );
-            }
-        };
-        let bytes = std::fs::read(&self.path).map_err(|source| self.unreadable(source))?;
+        let mut mesh = simplices(&self.read_cells(Wanted::Named(&ARRAYS))?).map_err(|message| self.wrong(message))?;
+        if self.ending() == "msh" {
+            // Gmsh writes the curves of its geometry beside every mesh.
+            mesh.notes.clear();
+        }
+        check(&mesh).map_err(|message| self.wrong(message))?;
+        Ok(mesh)
+    }
+
+    fn ending(&self) -> String {
+        self.path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+    }
+
+    /// Reads the mesh with its cells as the file has them, and those arrays that are wanted.
+    pub fn read_cells(&self, wanted: Wanted<'_>) -> Result<UnstructuredGrid, InputError> {
+        let ending = self.ending();
+        if !ENDINGS.contains(&ending.as_str()) {
+            let known = "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp or .vtu";
+            return Err(self.wrong(format!("can't tell what it holds; {known}")));
+        }
+        let bytes = crate::input::read(&self.path).map_err(|source| self.unreadable(source))?;
         if bytes.is_empty() {
             return Err(self.wrong("is empty"));
         }
-        let mesh = parse(&bytes).map_err(|message| self.wrong(message))?;
-        check(&mesh).map_err(|message| self.wrong(message))?;
-        Ok(mesh)
+        let grid = match ending.as_str() {
+            "stl" => stl::read(&bytes),
+            "ply" => ply::read(&bytes),
+            "obj" => obj::read(&bytes),
+            "msh" => msh::read(&bytes),
+            _ => match parse_wanted(&bytes, wanted) {
+                Ok(DataSet::Unstructured(grid)) => Ok(grid),
+                Ok(DataSet::Image(_)) => Err("holds an image, where a mesh was expected".into()),
+                Err(problem) => Err(problem.to_string()),
+            },
+        };
+        grid.map_err(|message| self.wrong(message))
     }
 }
 
@@ -106,9 +137,4 @@ fn check(mesh: &FileMesh) -> Result<(), String> {
         None if indices.is_empty() => Err(format!("holds no {kind}")),
         None => Ok(()),
     }
-}
-
-/// A polygon as a fan of triangles around its first point: right for convex ones.
-fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
-    polygon.windows(2).skip(1).map(|edge| [polygon[0], edge[0], edge[1]])
 }

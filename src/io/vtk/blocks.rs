@@ -19,6 +19,12 @@ const LZ4_MOST: u64 = 255;
 /// Memory that one LZMA block may ask for, in KiB: the dictionary of the highest level and room to spare.
 const LZMA_MEMORY: u32 = 160 << 10;
 
+/// How many bytes the blocks say they hold; 0 where they say nothing that makes sense.
+pub(super) fn declared(stream: &[u8], header: impl Fn(&[u8]) -> u64, header_size: usize) -> u64 {
+    let number = |i: usize| stream.get(i * header_size..(i + 1) * header_size).map(&header);
+    number(0).zip(number(1)).and_then(|(count, full)| count.checked_mul(full)).unwrap_or(0)
+}
+
 /// The bytes of an array out of its compressed blocks; `expected` is how many there must be, where that is known.
 ///
 /// Returns what is wrong in words. Memory grows only as blocks yield bytes, whatever lengths the header claims.

@@ -8,7 +8,7 @@ use roxmltree::Node;
 
 use super::Field;
 use super::Problem;
-use super::blocks::decompress;
+use super::blocks::{declared, decompress};
 use super::document::{Appended, Document, required};
 use crate::volume::{Array, Kind, Values};
 
@@ -29,7 +29,8 @@ pub(super) fn attributes(
 ) -> Result<Vec<Array>, Problem> {
     let mut arrays: Vec<Array> = Vec::new();
     for parent in piece.children().filter(|n| n.has_tag_name(element)) {
-        for node in parent.children().filter(Node::is_element) {
+        let asked = |node: &Node<'_, '_>| node.attribute("Name").is_none_or(|name| document.wanted.takes(name));
+        for node in parent.children().filter(Node::is_element).filter(asked) {
             let array = array(document, node, Some(tuples))?;
             if arrays.iter().any(|a| a.name == array.name) {
                 return Err(Problem::Duplicate { array: array.name });
@@ -44,7 +45,8 @@ pub(super) fn attributes(
 pub(super) fn field_data(document: &Document<'_>) -> Result<Vec<Field>, Problem> {
     let mut fields = Vec::new();
     let children = document.data_set.children().filter(|n| n.has_tag_name("FieldData"));
-    for node in children.flat_map(|n| n.children()).filter(Node::is_element) {
+    let asked = |node: &Node<'_, '_>| node.attribute("Name").is_none_or(|name| document.wanted.takes(name));
+    for node in children.flat_map(|n| n.children()).filter(Node::is_element).filter(asked) {
         fields.push(if node.attribute("type") == Some("String") {
             Field::Text(name(node)?, strings(document, node)?)
         } else {
@@ -93,6 +95,7 @@ pub(super) fn array(document: &Document<'_>, node: Node<'_, '_>, tuples: Option<
         } else {
             let expected = count.map(|n| n.checked_mul(kind.size() as u64).ok_or_else(too_large)).transpose()?;
             let bytes = bytes(document, node, &name, expected)?;
+            document.charge(&name, bytes.len() as u64)?;
             if !bytes.len().is_multiple_of(kind.size()) {
                 let cause = format!("{} bytes are no whole number of {}", bytes.len(), kind.vtk_name());
                 return Err(Problem::Damaged { array: name, cause });
@@ -232,6 +235,8 @@ fn bytes<'a>(
         return Ok(stream);
     }
     if let Some(compressor) = document.compressor {
+        let unpacked = declared(&stream, header, size);
+        document.charge(name, unpacked)?;
         return decompress(&stream, header, size, compressor, expected).map(Cow::from).map_err(damaged);
     }
     let truncated =

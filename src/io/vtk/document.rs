@@ -4,11 +4,13 @@
 //! they are. So the file is cut there, and the head closed by hand, before an XML parser sees it.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 
 use roxmltree::Node;
 
-use super::Problem;
 use super::blocks::Compressor;
+use super::{Problem, Wanted};
+use crate::volume::available_memory;
 
 /// A file cut in two.
 pub(super) struct Parts<'a> {
@@ -86,11 +88,15 @@ pub(super) struct Document<'a> {
     pub appended: Option<Appended<'a>>,
     /// All offsets into them, ascending: where one array ends another begins.
     pub offsets: Vec<usize>,
+    /// Which arrays are read.
+    pub wanted: Wanted<'a>,
+    /// Bytes of memory that its arrays may still take.
+    pub budget: Cell<u64>,
 }
 
 impl<'a> Document<'a> {
     /// Reads the root element's attributes.
-    pub fn new(root: Node<'a, 'a>, appended: Option<Appended<'a>>) -> Result<Self, Problem> {
+    pub fn new(root: Node<'a, 'a>, appended: Option<Appended<'a>>, wanted: Wanted<'a>) -> Result<Self, Problem> {
         if root.tag_name().name() != "VTKFile" {
             return Err(Problem::Foreign { found: format!("<{}", root.tag_name().name()) });
         }
@@ -126,7 +132,19 @@ impl<'a> Document<'a> {
             root.descendants().filter_map(|n| n.attribute("offset")?.trim().parse().ok()).collect();
         offsets.sort_unstable();
         offsets.dedup();
-        Ok(Self { kind, data_set, little_endian, header_size, compressor, appended, offsets })
+        let budget = Cell::new(available_memory().unwrap_or(u64::MAX) / 2);
+        Ok(Self { kind, data_set, little_endian, header_size, compressor, appended, offsets, wanted, budget })
+    }
+
+    /// Takes the bytes of an array from what there is; refused, before any is asked for, where that is less.
+    ///
+    /// A small file may declare a lot: compression makes thousands of bytes of one, and arrays may lie in one place.
+    pub fn charge(&self, array: &str, bytes: u64) -> Result<(), Problem> {
+        let left = self.budget.get();
+        let rest = left.checked_sub(bytes);
+        let rest = rest.ok_or_else(|| Problem::Memory { array: array.into(), needed: bytes, free: left })?;
+        self.budget.set(rest);
+        Ok(())
     }
 
     /// The one piece of the data set; none if it is empty.

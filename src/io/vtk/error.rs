@@ -30,7 +30,9 @@ pub enum Problem {
     #[error("the file is empty; write it again")]
     Empty,
     /// Not a VTK file.
-    #[error("not a VTK file: it begins with {found:?}, where `<?xml` and `<VTKFile` were expected")]
+    #[error(
+        "not a VTK file: it begins with {found:?}, where `<?xml`, `<VTKFile` or `# vtk DataFile Version` was expected"
+    )]
     Foreign {
         /// Its first characters.
         found: String,
@@ -96,6 +98,21 @@ pub enum Problem {
         /// In which way.
         cause: String,
     },
+    /// An array that memory has no room for.
+    #[error(
+        "array `{array}` takes {needed} bytes, and there is room for {free}; leave it out of the file, or take fewer points"
+    )]
+    Memory {
+        /// The array.
+        array: String,
+        /// Bytes it takes.
+        needed: u64,
+        /// Bytes that there is room for.
+        free: u64,
+    },
+    /// Something in a legacy file.
+    #[error("{0}")]
+    Legacy(String),
     /// Two arrays of one name.
     #[error("two arrays are called `{array}`; rename one of them")]
     Duplicate {

@@ -2,14 +2,12 @@
 
 use roxmltree::Node;
 
+use super::Field;
 use super::Problem;
+use super::cell::{self, POLYHEDRON, TETRAHEDRON, TRIANGLE};
 use super::data_array::{array, attributes, field_data};
 use super::document::{Document, child, required};
-use super::{Field, TETRAHEDRON, TRIANGLE};
 use crate::volume::{Array, Values};
-
-/// VTK's number for a polyhedron, whose faces lie in further arrays.
-const POLYHEDRON: u8 = 42;
 
 /// Points, and cells that are lists of points.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,6 +34,13 @@ impl UnstructuredGrid {
         let starts = std::iter::once(0).chain(self.offsets.iter().copied());
         let ranges = starts.zip(&self.offsets).map(|(start, &end)| &self.connectivity[start..end]);
         self.types.iter().copied().zip(ranges)
+    }
+
+    /// Appends a cell of this kind over these points.
+    pub fn push(&mut self, kind: u8, points: &[u32]) {
+        self.connectivity.extend_from_slice(points);
+        self.offsets.push(self.connectivity.len());
+        self.types.push(kind);
     }
 
     /// The point array of this name.
@@ -116,12 +121,12 @@ pub(super) fn read(document: &Document<'_>) -> Result<UnstructuredGrid, Problem>
             grid.types = indices(&types, "types", u8::MAX.into())?.into_iter().map(|n| n as u8).collect();
         }
     } else {
-        // The kinds in the order in which VTK numbers the cells: of one point or line, and of more.
-        for (element, number, kinds) in [
-            ("Verts", "NumberOfVerts", [1, 2]),
-            ("Lines", "NumberOfLines", [3, 4]),
-            ("Polys", "NumberOfPolys", [TRIANGLE, 7]),
-            ("Strips", "NumberOfStrips", [6, 6]),
+        // In the order in which VTK numbers the cells.
+        for (element, number) in [
+            ("Verts", "NumberOfVerts"),
+            ("Lines", "NumberOfLines"),
+            ("Polys", "NumberOfPolys"),
+            ("Strips", "NumberOfStrips"),
         ] {
             let n = if piece.has_attribute(number) { count(piece, number)? } else { 0 };
             if n == 0 {
@@ -129,15 +134,9 @@ pub(super) fn read(document: &Document<'_>) -> Result<UnstructuredGrid, Problem>
             }
             let before = grid.offsets.len();
             push_cells(document, child(piece, element)?, n, &mut grid)?;
-            let simple = match element {
-                "Verts" => 1,
-                "Lines" => 2,
-                _ => 3,
-            };
             for i in before..grid.offsets.len() {
                 let start = if i == 0 { 0 } else { grid.offsets[i - 1] };
-                let more = grid.offsets[i].checked_sub(start) != Some(simple);
-                grid.types.push(kinds[usize::from(more)]);
+                grid.types.push(cell::flat_kind(element, grid.offsets[i].saturating_sub(start)));
             }
             cells += n;
         }

@@ -1,60 +1,39 @@
-//! Reading VTK's XML files: `.vti`, `.vtu` and `.vtp`.
+//! VTK's files as one model: an image, or points and cells, with arrays on them and field data; read from the XML formats
+//! `.vti`, `.vtu` and `.vtp`, and from legacy `.vtk`.
 //!
 //! VTK's XML files keep their arrays in many ways: as text, as base64 inside the XML, or appended behind it, raw or
 //! in base64; whole or in compressed blocks (zlib, LZ4, LZMA); with lengths of 32 or 64 bits, in either byte order.
 //! All of them are read here, from VTK, ParaView and this crate alike.
 //!
-//! Why not by the `vtkio` crate, which writes the meshes: it keeps an image's origin and spacing in single precision,
-//! reads no raw appended arrays, which is how ParaView saves, and drops in silence compressed arrays whose length is a
-//! multiple of the block size. Here every array comes back or the file is refused. Legacy `.vtk` files are refused too:
-//! a reader that stops at the first attribute it does not know, as `vtkio`'s does, cannot tell a whole file from a
-//! part of one.
+//! Why not by the `vtkio` crate: it keeps an image's origin and spacing in single precision, reads no raw appended arrays,
+//! which is how ParaView saves, drops in silence compressed arrays whose length is a multiple of the block size, and stops at
+//! the first attribute of a legacy file that it does not know. Here every array that is asked for comes back or the file is
+//! refused. Tests hold the legacy reader against it.
 //!
 //! How a file becomes numbers: `document` cuts the XML off the appended bytes and parses it; `data_array` turns
-//! one `<DataArray>` into numbers, `blocks` undoing compression; `image` and `mesh` know what the elements mean.
-//! A file is never trusted: sizes are checked against the bytes at hand before memory is asked for.
+//! one `<DataArray>` into numbers, `blocks` undoing compression; `image` and `mesh` know what the elements mean; `legacy` is
+//! the other format; [`cell`] knows the kinds of cells.
+//! A file is never trusted: sizes are checked against the bytes at hand, and against the memory there is, before memory is
+//! asked for.
 
 mod blocks;
+pub mod cell;
 mod data_array;
 mod document;
 mod error;
 mod image;
+mod legacy;
 mod mesh;
+mod nesting;
 
 use std::path::Path;
 
+pub use cell::{TETRAHEDRON, TRIANGLE, cell_name};
 pub use error::{Error, Problem};
 pub use image::Image;
 pub use mesh::UnstructuredGrid;
 
 use crate::volume::{Array, Volume};
-
-/// VTK's number for a triangle.
-pub const TRIANGLE: u8 = 5;
-/// VTK's number for a tetrahedron.
-pub const TETRAHEDRON: u8 = 10;
-
-/// What VTK calls cells of this type; the number for those that are rare.
-pub fn cell_name(kind: u8) -> String {
-    let names = [
-        "empty cell",
-        "vertex",
-        "poly-vertex",
-        "line",
-        "poly-line",
-        "triangle",
-        "triangle strip",
-        "polygon",
-        "pixel",
-        "quad",
-        "tetrahedron",
-        "voxel",
-        "hexahedron",
-        "wedge",
-        "pyramid",
-    ];
-    names.get(usize::from(kind)).map_or_else(|| format!("VTK type {kind}"), |&name| name.to_owned())
-}
 
 /// What a VTK file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,12 +71,31 @@ impl Field {
     }
 }
 
+/// Which arrays of a file are read. What is not asked for is not decoded, so it can't be wrong either.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted<'a> {
+    /// All of them.
+    All,
+    /// Those of these names, on points, on cells, or of the data set.
+    Named(&'a [&'a str]),
+}
+
+impl Wanted<'_> {
+    /// Whether the array of this name is.
+    pub fn takes(&self, name: &str) -> bool {
+        match self {
+            Wanted::All => true,
+            Wanted::Named(names) => names.contains(&name),
+        }
+    }
+}
+
 /// Reads a VTK file of any kind known here; what it holds is told from its content, not from its name.
 ///
 /// # Errors
 /// If it cannot be read, is damaged, cut short, or foreign.
 pub fn read(path: &Path) -> Result<DataSet, Error> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     parse(&bytes).map_err(|problem| Error::File { path: path.into(), problem })
 }
 
@@ -133,18 +131,24 @@ pub fn read_volume(path: &Path) -> Result<Volume, Error> {
 /// # Errors
 /// As [`read`].
 pub fn parse(bytes: &[u8]) -> Result<DataSet, Problem> {
+    parse_wanted(bytes, Wanted::All)
+}
+
+/// The same with only those arrays that are wanted.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse_wanted(bytes: &[u8], wanted: Wanted<'_>) -> Result<DataSet, Problem> {
     if bytes.is_empty() {
         return Err(Problem::Empty);
     }
-    if bytes.starts_with(b"# vtk DataFile") {
-        return Err(Problem::Unsupported {
-            what: "a legacy `.vtk` file".into(),
-            remedy: "save it as `.vti` or `.vtu` (in ParaView: Save Data)",
-        });
+    if bytes.starts_with(legacy::MAGIC) {
+        return legacy::read(bytes, wanted);
     }
     let parts = document::cut(bytes)?;
+    nesting::check(&parts.head)?;
     let xml = roxmltree::Document::parse(&parts.head).map_err(|e| Problem::Xml(e.to_string()))?;
-    let document = document::Document::new(xml.root_element(), parts.appended)?;
+    let document = document::Document::new(xml.root_element(), parts.appended, wanted)?;
     match document.kind {
         "ImageData" => image::read(&document).map(DataSet::Image),
         "UnstructuredGrid" | "PolyData" => mesh::read(&document).map(DataSet::Unstructured),

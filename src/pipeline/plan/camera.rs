@@ -10,6 +10,7 @@ use super::range::{check_length, positive};
 use crate::geometry::Dimension;
 use crate::pipeline::error::Invalid;
 use crate::pipeline::spec::{CameraSpec, Projection};
+use crate::text::number;
 
 /// Sines of angles below this count as parallel.
 const PARALLEL: f64 = 1e-6;
@@ -98,8 +99,8 @@ pub(super) fn plan(
             unused("height", spec.height, "perspective");
             let field_of_view = spec.field_of_view.unwrap_or(90.0);
             // The tangent of half the angle scales the image, so the bounds themselves have no image.
-            if !(1e-3..=180.0 - 1e-3).contains(&field_of_view) {
-                let message = format!("expected degrees above 0 and below 180, found {field_of_view}");
+            if !(0.001..=179.999).contains(&field_of_view) {
+                let message = format!("expected 0.001 to 179.999 degrees, found {}", number(field_of_view));
                 return Err(Invalid::new(format!("{path}.field_of_view"), message));
             }
             ProjectionPlan::Perspective { field_of_view }
@@ -185,8 +186,8 @@ mod tests {
             ("{eye: [0, 0, 1]}", 4, "camera.eye: expected 4 numbers (the scene is 4D), found 3"),
             ("{eye: [0, 0, 1, 1e13]}", 4, "camera.eye[3]: expected a number of size up to 1e12, found 1e13"),
             ("{eye: [0, 0, 0, 0]}", 4, "camera.eye: `eye` and `target` are the same point; move one of them"),
-            ("{field_of_view: 180}", 4, "camera.field_of_view: expected degrees above 0 and below 180, found 180"),
-            ("{field_of_view: 0}", 3, "camera.field_of_view: expected degrees above 0 and below 180, found 0"),
+            ("{field_of_view: 180}", 4, "camera.field_of_view: expected 0.001 to 179.999 degrees, found 180"),
+            ("{field_of_view: 0}", 3, "camera.field_of_view: expected 0.001 to 179.999 degrees, found 0"),
             ("{projection: parallel, height: -1}", 3, "camera.height: expected a number above 0, found -1"),
             ("{over: [0, 0, 1]}", 3, "camera.over: a 3D scene has no direction over; take the key out"),
             (

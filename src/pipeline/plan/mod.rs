@@ -41,6 +41,8 @@ pub const MAX_DIMENSION: u64 = 65_535;
 pub const MAX_OBJECTS: usize = 65_535;
 /// Coordinates and lengths beyond this are refused: their squares must stay far inside `f32`.
 pub const MAX_LENGTH: f64 = 1e12;
+/// No length that must be above zero may be below this.
+pub const MIN_LENGTH: f64 = 1e-12;
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug, Serialize)]

@@ -12,6 +12,7 @@ use crate::geometry::Dimension;
 use crate::occlusion::exact;
 use crate::pipeline::error::Invalid;
 use crate::pipeline::spec::{Method, OcclusionSpec, SceneSpec};
+use crate::text::number;
 
 pub(super) fn scene(resolver: &mut Resolver, path: &str, id: String, spec: &SceneSpec) -> Result<ScenePlan, Invalid> {
     let number = spec.dimension.unwrap_or(4);
@@ -55,8 +56,12 @@ pub(super) fn occlusion(
         Some(name) => {
             let key = format!("{path}.load");
             let file = resolver.plan.folder.join(name);
-            if name.is_empty() || !file.is_file() {
-                return Err(Invalid::new(key, format!("there is no file {}", file.display())));
+            match crate::input::length(&file) {
+                Ok(_) if !name.is_empty() => {}
+                Err(cause) if file.exists() => {
+                    return Err(Invalid::new(key, format!("can't read {}: {cause}", file.display())));
+                }
+                _ => return Err(Invalid::new(key, format!("there is no file {}", file.display()))),
             }
             let unused: Vec<&str> = written(spec).collect();
             if !unused.is_empty() {
@@ -107,7 +112,10 @@ fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Res
         (None, None) => Samples::Fixed(256),
         (None, Some(error)) => {
             if !(error > 0.0 && error < 1.0) {
-                return refuse("target_error", format!("expected an error above 0 and below 1, found {error}"));
+                return refuse(
+                    "target_error",
+                    format!("expected an error above 0 and below 1, found {}", number(error)),
+                );
             }
             Samples::Target { error, max_samples: count("max_samples", spec.max_samples.unwrap_or(65_536))? }
         }

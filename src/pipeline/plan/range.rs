@@ -1,14 +1,18 @@
 //! Ranges of numbers that several stages share.
 
-use super::MAX_LENGTH;
+use super::{MAX_LENGTH, MIN_LENGTH};
 use crate::pipeline::error::Invalid;
+use crate::text::number;
 
 /// A length above zero, of a sane size.
 pub(super) fn positive(path: &str, x: f64) -> Result<f64, Invalid> {
-    if x > 0.0 {
+    // Below this, halves and quotients of the length would round to zero.
+    if x >= MIN_LENGTH {
         check_length(path, x)
+    } else if x > 0.0 {
+        Err(Invalid::new(path, format!("expected a number from {MIN_LENGTH:e} on, found {}", number(x))))
     } else {
-        Err(Invalid::new(path, format!("expected a number above 0, found {x}")))
+        Err(Invalid::new(path, format!("expected a number above 0, found {}", number(x))))
     }
 }
 
@@ -17,6 +21,6 @@ pub(super) fn check_length(path: &str, x: f64) -> Result<f64, Invalid> {
     if x.abs() <= MAX_LENGTH {
         Ok(x)
     } else {
-        Err(Invalid::new(path, format!("expected a number of size up to {MAX_LENGTH:e}, found {x:e}")))
+        Err(Invalid::new(path, format!("expected a number of size up to {MAX_LENGTH:e}, found {}", number(x))))
     }
 }

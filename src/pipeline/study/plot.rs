@@ -8,6 +8,7 @@ use std::fmt::Write;
 
 use super::Study;
 use super::tables::duration;
+use crate::text::for_xml;
 
 const WIDTH: f64 = 430.0;
 const HEIGHT: f64 = 400.0;
@@ -112,7 +113,7 @@ pub(super) fn svg(study: &Study) -> String {
          <text x='{}' y='28' font-size='17' font-weight='bold'>{}<tspan font-weight='normal' fill='#666' dx='12' \
          font-size='13'>{}D, {} vertices, {} simplices</tspan></text>\n",
         MARGIN[0],
-        study.name.replace('&', "&amp;").replace('<', "&lt;"),
+        for_xml(&study.name),
         study.dimension,
         super::grouped(study.vertices as u64),
         super::grouped(study.simplices as u64),

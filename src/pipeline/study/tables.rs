@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{Errors, Study, counted};
 use crate::pipeline::files::PROGRAM;
 use crate::pipeline::plan::grouped;
+use crate::text::for_markdown;
 
 /// One row a measurement. Occlusion: seconds are those of one vertex on one thread. Image: those of the whole image, values
 /// and all, on all threads.
@@ -49,7 +50,7 @@ pub(super) fn markdown(study: &Study) -> String {
     };
     let looked_at = study.truth.values.len();
     let rest = if looked_at < study.vertices { format!(", of which {looked_at} are looked at") } else { String::new() };
-    line(format_args!("# Error against time: {}\n", study.name));
+    line(format_args!("# Error against time: {}\n", for_markdown(&study.name)));
     line(format_args!(
         "{}D, {}{rest}, {}. Seed {}, {}, {PROGRAM}.",
         study.dimension,

@@ -10,6 +10,10 @@
 //! - their distance d from the voxel's tangent plane in footprints of a voxel: about `exp(-d^2)`;
 //! - their place in the window: half at its ends along each axis.
 //!
+//! A value that stands out from its fit by more than noise can is no noise: where a body touches another, occlusion jumps
+//! from voxel to voxel. Beyond three standard deviations of a value by so many rays, `sqrt(p (1 - p) / n)` times what even
+//! points leave of it, about `n^(-1/4)`, more and more of the value itself is kept.
+//!
 //! An image of three axes has many neighbours close by: a window 7 voxels wide holds 343, where one of two axes has to be
 //! 17 wide for 289. The fit's own scatter and the weights tell the standard error of the result.
 //!
@@ -185,8 +189,8 @@ impl Sums {
         self.value_squares.iter_mut().zip(v2).for_each(|(sum, &r)| *sum += r);
     }
 
-    /// The fitted value at voxel `x` and its standard error.
-    fn fit<const D: usize>(&self, x: usize, radius: &[usize; 3], rays: u32) -> Option<(f32, f32)> {
+    /// The fitted value at voxel `x`, whose own is `raw`, and its standard error.
+    fn fit(&self, x: usize, raw: f32, radius: &[usize; 3], rays: u32) -> Option<(f32, f32)> {
         let symmetric = |of: &[Vec<f32>; 10]| {
             let [a, b, c, d, e, f, g, h, i, j] = of.each_ref().map(|sums| f64::from(sums[x]));
             Matrix4::new(a, b, c, d, b, e, f, g, c, f, h, i, d, g, i, j)
@@ -210,11 +214,20 @@ impl Sums {
         let scatter = f64::from(self.value_squares[x]) - coefficients.dot(&values);
         let variance = if freedom > 1e-3 * weight { scatter.max(0.0) / freedom } else { 0.25 };
         // Neighbours that all agree are not certain either: the rule of three, as for the rays of one point.
-        let least = 1.5 * spread / f64::from(rays.max(1));
-        let error = (variance * spread).sqrt().max(least).min(1.0);
-        let value = coefficients[0];
-        value.is_finite().then_some((value.clamp(0.0, 1.0) as f32, error as f32))
+        let rays = f64::from(rays.max(1));
+        let fitted = (variance * spread).max((1.5 * spread / rays).powi(2));
+        let value = coefficients[0].clamp(0.0, 1.0);
+        let noise = ((value * (1.0 - value)).max(0.25 / rays) / rays / rays.sqrt()).sqrt();
+        let kept = kept(f64::from(raw) - value, 3.0 * noise);
+        let error = (fitted * (1.0 - kept) + (kept * noise).powi(2)).sqrt().min(1.0);
+        let value = value + kept * (f64::from(raw) - value);
+        value.is_finite().then_some((value as f32, error as f32))
     }
+}
+
+/// The part of a difference that is kept: none up to the threshold, nearly all far beyond it.
+fn kept(difference: f64, threshold: f64) -> f64 {
+    if difference.abs() > threshold { 1.0 - (threshold / difference).powi(2) } else { 0.0 }
 }
 
 /// The weight of a neighbour by the cosine of the normals and the distance from the tangent plane in footprints.
@@ -319,7 +332,7 @@ impl<const D: usize> ImageFilter<D> for Denoise<D> {
                 }
                 self.sum(input, &planes, [j, k], scratch);
                 for x in (0..width).filter(|&x| out.simplex[x] != NOTHING) {
-                    if let Some((value, error)) = scratch.sums.fit::<D>(x, &self.radius, self.rays) {
+                    if let Some((value, error)) = scratch.sums.fit(x, out.occlusion[x], &self.radius, self.rays) {
                         (out.occlusion[x], out.error[x]) = (value, error);
                     }
                 }
