@@ -15,7 +15,7 @@ pub fn main() {
     for (name, w, size) in [("front", -0.2, 0.6), ("back", -0.5, 1.4)] {
         let corner = |x: f64, y: f64, z: f64| Vector64::<4>::new(size * x, size * y, size * z, w);
         let vertices = vec![corner(-1., -1., -1.), corner(1., -1., -1.), corner(0., 1., -1.), corner(0., 0., 1.)];
-        let surface = Surface { vertices, simplices: vec![[0, 1, 2, 3]] };
+        let surface = Surface { vertices, simplices: vec![[0, 1, 2, 3]], normals: None };
         let eye = Orientation::Facing(Camera::new(&View::default()).expect("a camera").viewpoint());
         builder.add(name, [0.9, 0.6, 0.3], &surface, eye).expect("a sound mesh");
     }

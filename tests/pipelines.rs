@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use ao4d::io::vtk;
 use ao4d::pipeline::{Pipeline, Report, Settings, run};
 use ao4d::progress::Silent;
-use ao4d::stages::occlusion::{Method, OcclusionSource};
+use ao4d::stages::occlusion::OcclusionSource;
 use ao4d::stages::paraview::FigurePlan;
 use ao4d::stages::write::{Format, WritePlan};
 
@@ -62,7 +62,7 @@ fn every_pipeline_leaves_what_it_promises() {
                 greys.sort_by(f64::total_cmp);
                 greys.dedup();
                 let published = render.occlusion.is_some_and(|o| match &pipeline.plan[o].source {
-                    OcclusionSource::Compute(computation) => computation.method == Method::AsPublished,
+                    OcclusionSource::Compute(computation) => computation.method.is_of_the_thesis(),
                     OcclusionSource::Load(_) => false,
                 });
                 let enough = if published { 2 } else { 1 + 2 * usize::from(render.occlusion.is_some()) };

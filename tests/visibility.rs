@@ -233,7 +233,7 @@ fn every_pipelines_pictures() {
         let pipeline = Pipeline::load(&file, &[], None).unwrap();
         let mut seen = 0;
         for (scene, _) in pipeline.plan.all::<ScenePlan>() {
-            seen += match AnyMesh::build(&pipeline.plan, scene, &mut Vec::new()).unwrap() {
+            seen += match AnyMesh::build(&pipeline.plan, scene, &mut Vec::new(), &Silent).unwrap() {
                 AnyMesh::Three(mesh) => pipeline_scene(&name, &pipeline, scene, &mesh),
                 AnyMesh::Four(mesh) => pipeline_scene(&name, &pipeline, scene, &mesh),
             };

@@ -22,7 +22,7 @@ use super::write::{self, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::io;
 use crate::occlusion::exact::{self, Budget};
-use crate::occlusion::{self, Deviations, ProgramDeviations, Estimates, Estimator, Sidecar};
+use crate::occlusion::{self, Deviations, Estimates, Estimator, ProgramDeviations, Sidecar};
 use crate::text::number;
 use crate::trace::{Sampler, Sampling, Target};
 

@@ -233,12 +233,7 @@ fn shown(spec: &ParaviewSpec, path: &str, format: Format, resolver: &Resolver) -
 }
 
 /// A figure can colour by ambient occlusion only what its files hold.
-fn check_occlusion(
-    resolver: &Resolver,
-    path: &str,
-    reader: Reader,
-    writes: &[Ref<WritePlan>],
-) -> Result<(), Invalid> {
+fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[Ref<WritePlan>]) -> Result<(), Invalid> {
     let key = format!("{path}.color_by");
     if reader == Reader::Raw {
         let message = "`.raw` files hold colours alone, no ambient occlusion; take `reader: vti`, or `color_by: rgba`";

@@ -109,9 +109,9 @@ impl Stage for RenderPlan {
         let camera = camera::plan(camera_spec, &format!("{path}.camera"), dimension, warnings)?;
         let shading = spec.shading.unwrap_or_default();
         let refusal = match occlusion.map(|o| &resolver.plan[o].source).filter(|_| shading == Shading::Voxel) {
-            Some(OcclusionSource::Load(_)) => {
-                Some("`voxel` computes occlusion at the visible points, which a loaded file has no values for".to_owned())
-            }
+            Some(OcclusionSource::Load(_)) => Some(
+                "`voxel` computes occlusion at the visible points, which a loaded file has no values for".to_owned(),
+            ),
             Some(OcclusionSource::Compute(computation)) if computation.method.is_of_the_thesis() => {
                 let method = computation.method.as_str();
                 Some(format!("`{method}` has values at vertices only; take `flat`, as the thesis did"))
