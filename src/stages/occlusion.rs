@@ -503,6 +503,40 @@ impl Method {
     }
 }
 
+impl OcclusionPlan {
+    /// What computes the occlusion of voxels beside that of vertices, for `shading: auto`: a sixteenth of a vertex's rays,
+    /// from 4 to 16, by the same sampler. None where rays are no way to the same values: of a file nobody knows how it came
+    /// about, and the thesis's methods have values at vertices only.
+    pub fn at_voxels(&self) -> Option<Estimator> {
+        let OcclusionSource::Compute(computation) = &self.source else { return None };
+        let most = match computation.samples {
+            Samples::Fixed(samples) => samples,
+            Samples::Target { .. } | Samples::Exact => 256,
+        };
+        let sampling = Sampling {
+            sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
+            samples: (most / 16).clamp(4, 16) as u32,
+            seed: computation.seed,
+            max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
+            target: None,
+        };
+        (!computation.method.is_of_the_thesis()).then_some(Estimator::Sampled(sampling))
+    }
+
+    /// How many rays a voxel takes with this shading; none where it takes none, or as many as it needs.
+    pub fn rays_per_voxel(&self, shading: render::Shading) -> Option<u32> {
+        let estimator = match (shading, &self.source) {
+            (render::Shading::Auto, _) => self.at_voxels()?,
+            (render::Shading::Voxel, OcclusionSource::Compute(computation)) => computation.estimator(),
+            _ => return None,
+        };
+        match estimator {
+            Estimator::Sampled(sampling) if sampling.target.is_none() => Some(sampling.samples),
+            _ => None,
+        }
+    }
+}
+
 impl Computation {
     /// What computes the values.
     pub fn estimator(&self) -> Estimator {

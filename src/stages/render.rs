@@ -18,11 +18,16 @@ use super::scene::{MISSING, ScenePlan};
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::geometry::Dimension;
+use crate::render::filters::{Denoise, Dilate, ImageFilter};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Aov, Columns, NOTHING, Renderer};
+use crate::render::{self, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
 
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
+/// The most layers of empty voxels that take over values.
+const MAX_DILATION: usize = 16;
+/// Voxels of fewer rays are denoised, unless it is said otherwise.
+const DENOISED_BELOW: u32 = 64;
 /// The working set of a slab: so little that memory is used again for the next, not asked for anew.
 const SLAB_BYTES: usize = 16 << 20;
 
@@ -40,8 +45,19 @@ pub struct RenderSpec {
     pub camera: Option<CameraSpec>,
     /// Voxels along x, y and z; in 3D pixels along x and y.
     pub dimensions: Vec<u64>,
-    /// How the vertices' values spread over a simplex (default `smooth`).
+    /// Where the occlusion of a visible point comes from (default `smooth`).
     pub shading: Option<Shading>,
+    /// Whether the occlusion of voxels is denoised by that of their neighbours; with `voxel` (default: below 64 rays) and
+    /// `auto` (always).
+    pub denoise: Option<bool>,
+    /// Samples of a voxel along each axis; opacity, colour, occlusion and depth are means over those that see something
+    /// (default 1).
+    #[schemars(range(min = 1, max = 8))]
+    pub supersample: Option<u64>,
+    /// Layers of empty voxels around bodies that take over the bodies' colour and occlusion, so that contours and volume
+    /// renderings mix in nothing else; opacity tells what is real (default 3 in 4D, 0 in 3D).
+    #[schemars(range(min = 0, max = 16))]
+    pub dilate: Option<u64>,
     /// How it is found out what voxels see; changes the time, never the image (default `auto`, the faster one).
     pub visibility: Option<Visibility>,
 }
@@ -55,8 +71,10 @@ pub enum Shading {
     Smooth,
     /// The mean over the simplex.
     Flat,
-    /// Computed at the visible point itself: slow, the reference for the others.
+    /// Computed at the visible point itself: the reference for the others.
     Voxel,
+    /// Interpolated, and mended by few rays at each voxel, denoised: right where surfaces touch, too.
+    Auto,
 }
 
 /// An image of a scene, as understood.
@@ -70,8 +88,14 @@ pub struct RenderPlan {
     pub camera: CameraPlan,
     /// Voxels along x, y and z; one layer in 3D.
     pub dimensions: [usize; 3],
-    /// How vertex values spread.
+    /// Where the occlusion of a visible point comes from.
     pub shading: Shading,
+    /// Whether it is denoised.
+    pub denoise: bool,
+    /// Samples of a voxel along each axis.
+    pub supersample: usize,
+    /// Layers of empty voxels that take over bodies' values.
+    pub dilate: usize,
     /// How it is found out what voxels see.
     pub visibility: Visibility,
     /// The arrays that its files need, in their own order, each once.
@@ -126,7 +150,33 @@ impl Stage for RenderPlan {
         }
         let dimensions = dimensions(&format!("{path}.dimensions"), &spec.dimensions, dimension)?;
         let visibility = spec.visibility.unwrap_or_default();
-        Ok(Self { scene, occlusion, camera, dimensions, shading, visibility, arrays: Vec::new() })
+        let rays = occlusion.and_then(|o| resolver.plan[o].rays_per_voxel(shading));
+        if spec.denoise == Some(true) && rays.is_none() {
+            resolver
+                .warn(format!("{path}.denoise"), "has no effect but where rays are taken at voxels: `voxel` or `auto`");
+        }
+        if spec.denoise == Some(false) && shading == Shading::Auto {
+            let message =
+                "`auto` takes so few rays at a voxel that they must be denoised; leave this out, or take `voxel`";
+            return Err(Invalid::new(format!("{path}.denoise"), message));
+        }
+        let few = rays.is_some_and(|rays| shading == Shading::Auto || rays < DENOISED_BELOW);
+        let denoise = rays.is_some() && spec.denoise.unwrap_or(few);
+        let within = |key: &str, found: Option<u64>, default: usize, least: usize, most: usize| match found {
+            None => Ok(default),
+            Some(n) if (least as u64..=most as u64).contains(&n) => Ok(n as usize),
+            Some(n) => Err(Invalid::new(format!("{path}.{key}"), format!("expected {least} to {most}, found {n}"))),
+        };
+        let supersample = within("supersample", spec.supersample, 1, 1, MOST_SAMPLES)?;
+        if dimensions.iter().any(|&d| (d * supersample) as u64 > MAX_DIMENSION) {
+            let message =
+                format!("with {supersample} samples along each axis an image has at most {MAX_DIMENSION} of them");
+            return Err(Invalid::new(format!("{path}.supersample"), message));
+        }
+        let layers = if dimension == Dimension::Four { 3 } else { 0 };
+        let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
+        let arrays = Vec::new();
+        Ok(Self { scene, occlusion, camera, dimensions, shading, denoise, supersample, dilate, visibility, arrays })
     }
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
@@ -154,8 +204,16 @@ impl Stage for RenderPlan {
         }
         let dimension = plan[render.scene].dimension;
         let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
-        let columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
-        let voxel = size_of::<u32>() as u64 + columns.bytes::<4>() as u64 + arrays;
+        let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
+        let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
+        if render.denoise {
+            columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
+            halo += 6;
+        }
+        let samples = (render.supersample.pow(axes) * size_of::<u32>()) as u64;
+        // Filters keep the layers that they look at.
+        let layers = if axes == 3 { 1 + halo } else { 1 };
+        let voxel = samples + layers * columns.bytes::<4>() as u64 + arrays;
         Needs { memory: (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel), disk: 0 }
     }
 
@@ -194,7 +252,8 @@ impl Stage for RenderPlan {
         }
         let shading = shading(plan, render, scene);
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
-        picture.visibility = render.visibility;
+        (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
+        picture.filters = filters(plan, render, &picture);
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
         let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &picture.grid, hash)?;
@@ -248,7 +307,9 @@ pub(super) fn mark_seen<const D: usize>(
 ) -> Result<bool, StageError> {
     let render = &run.plan[me];
     let camera = camera::camera(&render.camera)?;
-    let grid = camera.grid(render.dimensions);
+    // All samples, not the voxels' centres alone.
+    let samples = |a: usize| if a < D - 1 { render.dimensions[a] * render.supersample } else { 1 };
+    let grid = camera.grid(std::array::from_fn(samples));
     let backend = Arc::clone(scene.session.backend()?);
     let visibility = render::Visibility::new(backend, &camera, &grid, render.visibility);
     *left = left.saturating_sub(visibility.cost());
@@ -275,8 +336,27 @@ fn shading<const D: usize>(plan: &Plan, render: &RenderPlan, scene: &SceneRun<D>
     match (render.shading, &plan[occlusion].source) {
         (Shading::Voxel, OcclusionSource::Compute(computation)) => render::Shading::Voxel(computation.estimator()),
         (Shading::Flat, _) => render::Shading::Flat(Arc::clone(&scene.values[&occlusion])),
+        (Shading::Auto, _) if render.denoise => {
+            let values = Arc::clone(&scene.values[&occlusion]);
+            plan[occlusion].at_voxels().map_or(render::Shading::Smooth(Arc::clone(&values)), |estimator| {
+                render::Shading::Auto(values, estimator)
+            })
+        }
         _ => render::Shading::Smooth(Arc::clone(&scene.values[&occlusion])),
     }
+}
+
+/// What looks at neighbouring voxels, in this order.
+fn filters<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<D>) -> Vec<Box<dyn ImageFilter<D>>> {
+    let mut filters: Vec<Box<dyn ImageFilter<D>>> = Vec::new();
+    let rays = render.occlusion.and_then(|occlusion| plan[occlusion].rays_per_voxel(render.shading));
+    if let Some(rays) = rays.filter(|_| render.denoise) {
+        filters.push(Box::new(Denoise::new(&picture.camera, &picture.grid, rays)));
+    }
+    if render.dilate > 0 {
+        filters.push(Box::new(Dilate { layers: render.dilate }));
+    }
+    filters
 }
 
 /// Why a picture shows nothing.
@@ -297,6 +377,7 @@ impl Shading {
             Shading::Smooth => "smooth",
             Shading::Flat => "flat",
             Shading::Voxel => "voxel",
+            Shading::Auto => "auto",
         }
     }
 }

@@ -286,6 +286,9 @@ impl WritePlan {
 const MESH_LEFT_OUT: &[LeftOut] = &[
     LeftOut::new("/dimensions", "a mesh has no voxels"),
     LeftOut::new("/shading", "a mesh has the values of its vertices"),
+    LeftOut::new("/denoise", "a mesh has no voxels"),
+    LeftOut::new("/supersample", "a mesh has no voxels"),
+    LeftOut::new("/dilate", "a mesh has no voxels"),
 ];
 
 impl Stage for WritePlan {

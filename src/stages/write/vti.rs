@@ -92,6 +92,9 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Pa
         "camera": render.camera,
         "dimensions": render.dimensions,
         "shading": render.shading,
+        "denoise": render.denoise,
+        "supersample": render.supersample,
+        "dilate": render.dilate,
     });
     vti::Settings {
         encoding: match write.encoding {
