@@ -15,10 +15,13 @@ use std::time::Instant;
 use ao4d::accel::Tracer;
 use ao4d::mesh::Mesh;
 use ao4d::occlusion::Estimator;
-use ao4d::pipeline::{AnyMesh, Pipeline, camera};
+use ao4d::pipeline::Pipeline;
 use ao4d::progress::Silent;
 use ao4d::render::filters::Denoise;
 use ao4d::render::{Aov, Renderer, Shading};
+use ao4d::stages::camera::camera;
+use ao4d::stages::render::RenderPlan;
+use ao4d::stages::scene::AnyMesh;
 use ao4d::trace::cpu::CpuBackend;
 use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 
@@ -50,7 +53,8 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn measure<const D: usize>(name: &str, pipeline: &Pipeline, mesh: Mesh<D>, longest: usize, truth: u32) {
-    let Some(plan) = pipeline.plan.renders.iter().find(|r| r.occlusion.is_some()) else { return };
+    let mut renders = pipeline.plan.all::<RenderPlan>().map(|(_, plan)| plan);
+    let Some(plan) = renders.find(|render| render.occlusion.is_some()) else { return };
     let camera = camera::<D>(&plan.camera).expect("a camera");
     let wanted = if D == 3 { 5 * longest } else { longest };
     let most = plan.dimensions.iter().copied().max().unwrap_or(1);
@@ -89,6 +93,18 @@ fn measure<const D: usize>(name: &str, pipeline: &Pipeline, mesh: Mesh<D>, longe
             renderer(Shading::Smooth(Arc::new(found)))
         };
         row("smooth", rays, points.len(), image(smooth));
+    }
+    for rays in [64, 128, 256] {
+        for own in [4, 16] {
+            let auto = || {
+                let found = by_rays(rays).estimate(&*backend, &points, None, &Silent).expect("nobody cancels");
+                let mut renderer = renderer(Shading::Auto(Arc::new(found), by_rays(own)));
+                renderer.filters.push(Box::new(Denoise::new(&renderer.camera, &renderer.grid, own)));
+                renderer
+            };
+            let asked = points.len() + count * own as usize / rays as usize;
+            row(&format!("auto, {own} a voxel"), rays, asked, image(auto));
+        }
     }
     for rays in [1, 4, 16, 64] {
         row("voxel", rays, count, image(|| renderer(Shading::Voxel(by_rays(rays)))));

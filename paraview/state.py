@@ -1,5 +1,5 @@
 # @TITLE@
-# A ParaView state, written by @PROGRAM@ for ParaView 5.10 and later. Three ways to open it:
+# A ParaView state, written by @PROGRAM@ for ParaView 5.11 and later. Three ways to open it:
 #
 #   in the program      File > Load State..., or   paraview --state=THIS_FILE
 #   with a display      pvpython THIS_FILE [FOLDER]
@@ -7,15 +7,13 @@
 #
 # The last two write the picture, into FOLDER or else beside this file. The volumes are looked for beside this file
 # too, so the folder may be moved or sent away as a whole.
-#
-# What is shown. Each voxel is drawn as a small box in its own colour, without a colour map and without fog. The upper
-# view of a volume is cut open where CUT says; there the faces of the boxes are dimmed a little by their direction
-# (RELIEF) so that the eye can tell them apart. The lower view shows three slices, in exactly the colours of the file.
 
 import math
 import os
 import sys
 
+import paraview
+paraview.compatibility.major, paraview.compatibility.minor = 5, 11  # newer versions then take the names used here
 from paraview.simple import *
 from paraview import servermanager
 import paraview.simple
@@ -32,8 +30,10 @@ CUT = @CUT@
 SCREENSHOT = @SCREENSHOT@
 # The picture's width and height in pixels, or None: as the panels need.
 SIZE = @SIZE@
-# How much the faces of voxels are dimmed by their direction; 0: not at all.
-RELIEF = 0.3
+# 'rgba': the colours of the file; 'ambient_occlusion': a colour map from 0, fully occluded, to 1, open.
+COLOR_BY = @COLOR_BY@
+# Whether a colour bar stands in the last view.
+COLORBAR = @COLORBAR@
 # From where the volumes are seen, against the middle of the image; +y is up.
 CAMERA = (1.0, 0.72, 1.45)
 # The colours of outlines and of text.
@@ -217,13 +217,6 @@ def grid_bounds(panel):
             for v in (o - s / 2, o + (n - 0.5) * s)]
 
 
-def cut_away(centre):
-    """What AWAY says above."""
-    if CUT is None:
-        return []
-    return [(CUT[1], CUT[2])] if CUT[0] == 'plane' else list(enumerate(centre))
-
-
 # ------------------------------------------------------------------------------------------------------------- views
 
 def make_view(name, parallel):
@@ -237,8 +230,8 @@ def make_view(name, parallel):
     return v
 
 
-def place_camera(v, bounds, aspect, room):
-    """Moves back along CAMERA until the box fills the view below `room`, the share that the caption takes."""
+def place_camera(v, bounds, aspect, above, below=0.0):
+    """Moves back along CAMERA until the box fills the view between the shares above and below it, left to text."""
     length = math.sqrt(CAMERA[0] ** 2 + CAMERA[1] ** 2 + CAMERA[2] ** 2)
     back = [c / length for c in CAMERA]
     right = [back[2] / math.hypot(back[0], back[2]), 0.0, -back[0] / math.hypot(back[0], back[2])]
@@ -256,13 +249,32 @@ def place_camera(v, bounds, aspect, room):
     for _ in range(20):
         seen = [[c[a] / ((away - c[2]) * slope) for c in corners] for a in range(2)]
         box = [f(values) for values in seen for f in (smallest, largest)]
-        grow = largest((box[1] - box[0]) / (1.86 * aspect), (box[3] - box[2]) / (1.9 - 2.0 * room))
+        grow = largest((box[1] - box[0]) / (1.86 * aspect), (box[3] - box[2]) / (1.9 - 2.0 * (above + below)))
         away *= grow
         shift = [(box[0] + box[1]) / 2 * slope * away / grow, (box[2] + box[3]) / 2 * slope * away / grow]
-    shift[1] += room * slope * away
+    shift[1] += (above - below) * slope * away
     target = [m + shift[0] * r + shift[1] * u for m, r, u in zip(middle, right, up)]
     setp(v, CameraViewAngle=angle, CameraFocalPoint=target, CenterOfRotation=middle, CameraViewUp=[0.0, 1.0, 0.0],
          CameraPosition=[t + away * b for t, b in zip(target, back)], CameraParallelScale=slope * away)
+
+
+def show_bar(v):
+    """The colour bar of ambient occlusion, where it is wanted: of the colour map, or of how far a colour is darkened."""
+    if not COLORBAR:
+        return
+    bar = GetScalarBar(GetColorTransferFunction('ambient_occlusion'), v)
+    size = text_size()
+    setp(bar, Title='ambient occlusion A', ComponentTitle='', TitleColor=TEXT, LabelColor=TEXT, TitleFontFamily='Arial',
+         LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0,
+         LabelFormat='%.2f', RangeLabelFormat='%.0f', UseCustomLabels=1, CustomLabels=[0.25, 0.5, 0.75],
+         ScalarBarThickness=int(0.7 * size), ScalarBarLength=0.36, Orientation='Horizontal')
+    for place in ('Any Location', 'AnyLocation'):
+        try:
+            bar.WindowLocation = place
+            break
+        except ValueError:
+            pass
+    setp(bar, Position=[0.32, 0.015], Visibility=1)
 
 
 def show_caption(text, v):
@@ -274,104 +286,36 @@ def show_caption(text, v):
             break
         except ValueError:
             pass
-    setp(d, Color=TEXT, FontSize=20, FontFamily='Arial', Bold=0, Shadow=0)
+    setp(d, Color=TEXT, FontSize=text_size(), FontFamily='Arial', Bold=0, Shadow=0)
 
 
-def show_label(text, position, v):
+BILLBOARDS = []
+
+
+def show_label(label, position, v):
     """Text that begins at a point of the scene and always faces the viewer."""
-    label = Text(registrationName='Label: ' + text, Text=text)
     d = Show(label, v, 'TextSourceRepresentation')
-    setp(d, TextPropMode='Billboard 3D Text', BillboardPosition=position, Color=TEXT, FontSize=16, FontFamily='Arial',
-         Bold=0, Shadow=0)
+    setp(d, TextPropMode='Billboard 3D Text', BillboardPosition=position, Color=TEXT, FontSize=text_size(),
+         FontFamily='Arial', Bold=0, Shadow=0)
+    BILLBOARDS.append(d)
 
 
-def show_lines(source, v):
-    d = Show(source, v)
-    d.SetRepresentationType('Wireframe')
-    d.ColorArrayName = [None, '']
-    setp(d, AmbientColor=LINES, DiffuseColor=LINES, Ambient=1.0, Diffuse=0.0, LineWidth=1.0)
+def colour_by(d, association, array):
+    """Colours a representation as COLOR_BY says; `array` holds the colours that the file gives."""
+    mapped = COLOR_BY == 'ambient_occlusion'
+    name = COLOR_BY if mapped else array
+    d.ColorArrayName = [association, name]
+    d.LookupTable = GetColorTransferFunction(name)
+    d.MapScalars = int(mapped)
 
 
 def show_cells(source, v, array, relief):
-    """Shows cells in the colours that they hold."""
+    """Shows cells in their colours."""
     d = Show(source, v)
     d.SetRepresentationType('Surface')
-    d.ColorArrayName = ['CELLS', array]
-    d.LookupTable = GetColorTransferFunction(array)
-    d.MapScalars = 0
+    colour_by(d, 'CELLS', array)
     setp(d, Ambient=1.0 - relief, Diffuse=relief, Specular=0.0, Interpolation='Flat')
     return d
-
-
-def show_volume(panel, reader, array, centre, v):
-    name = os.path.splitext(panel['file'])[0]
-    cells = points_to_cells(reader, name + ': voxels', away=cut_away(centre))
-    show_cells(shown_cells(cells, name + ': cut open'), v, array, RELIEF)
-    # One white light that goes with the camera, a little above it; ParaView's own three are tinted.
-    v.UseLight = 0
-    light = AddLight(view=v)
-    setp(light, Coords='Camera', Type='Directional', Position=[-0.25, 0.6, 1.0], FocalPoint=[0.0, 0.0, 0.0],
-         Intensity=1.0, DiffuseColor=[1.0, 1.0, 1.0])
-    bounds = grid_bounds(panel)
-    frame = Box(registrationName=name + ': frame', Center=middle_of(bounds),
-                XLength=bounds[1] - bounds[0], YLength=bounds[3] - bounds[2], ZLength=bounds[5] - bounds[4])
-    show_lines(Outline(registrationName=name + ': outline', Input=frame), v)
-    out = 0.05 * largest(bounds[2 * a + 1] - bounds[2 * a] for a in range(3))
-    x, y, z = middle_of(bounds)
-    show_label('x', [x, bounds[2] - 1.6 * out, bounds[5] + out], v)
-    show_label('y', [bounds[0] - 1.6 * out, y, bounds[5]], v)
-    show_label('z', [bounds[1] + out, bounds[2] - out, z], v)
-    if array == 'rgba':  # ready for who prefers ParaView's own volume rendering: click on the reader's eye
-        d = Show(reader, v, 'UniformGridRepresentation')
-        d.SetRepresentationType('Volume')
-        d.ColorArrayName = ['POINTS', 'rgba']
-        d.LookupTable = GetColorTransferFunction('rgba')
-        d.ScalarOpacityFunction = GetOpacityTransferFunction('rgba')
-        setp(d, MapScalars=0, ScalarOpacityUnitDistance=smallest(panel['spacing']), VolumeRenderingMode='Smart',
-             Shade=0)
-        Hide(reader, v)
-
-
-def turned_slice(panel, reader, axis, index, move):
-    """One layer of voxels, turned to face the viewer."""
-    name = '%s: %s slice' % (os.path.splitext(panel['file'])[0], 'xyz'[axis])
-    n = panel['dimensions']
-    layer = ExtractSubset(registrationName=name, Input=reader)
-    layer.VOI = [v for a in range(3) for v in ((index, index) if a == axis else (0, n[a] - 1))]
-    turned = Transform(registrationName=name + ', turned', Input=points_to_cells(layer, name + ', squares', flat=axis))
-    setp(turned, TransformAllInputVectors=0)  # three numbers a voxel are a colour here, no direction to be turned
-    turned.Transform.Rotate = ([0.0, 90.0, 0.0], [-90.0, 0.0, 0.0], [0.0, 0.0, 0.0])[axis]
-    turned.Transform.Translate = move
-    HideInteractiveWidgets(turned.Transform)
-    return turned
-
-
-def show_slices(panel, reader, array, centre, v, aspect):
-    """The layers at the centre side by side: xy, xz, and zy, the first letter to the right and the second up."""
-    name = os.path.splitext(panel['file'])[0]
-    bounds, n = grid_bounds(panel), panel['dimensions']
-    edge = [bounds[2 * a + 1] - bounds[2 * a] for a in range(3)]
-    gap = 0.12 * largest(edge)
-    left, top = 0.0, largest(edge[1], edge[2])
-    turned = []
-    for axis, right, up in ((2, 0, 1), (1, 0, 2), (0, 2, 1)):
-        o, s = panel['origin'][axis], panel['spacing'][axis]
-        index = smallest(largest(int(math.floor((centre[axis] - o) / s + 1e-9)), 0), n[axis] - 1)
-        at = o + index * s
-        # After the turn the image's axes `right` and `up` lie along x and y, and `axis` along z, or against it.
-        move = [left - bounds[2 * right], (top - edge[up]) / 2 - bounds[2 * up], -at if axis == 2 else at]
-        turned.append(turned_slice(panel, reader, axis, index, move))
-        text = '%.2f' % at
-        show_label('%s%s,  %s = %s' % ('xyz'[right], 'xyz'[up], 'xyz'[axis], '0.00' if text == '-0.00' else text),
-                   [left, (top - edge[up]) / 2 - 0.13 * top, 0.0], v)
-        left += edge[right] + gap
-    together = AppendDatasets(registrationName=name + ': slices', Input=turned)
-    show_cells(together, v, array, 0.0)
-    surface = ExtractSurface(registrationName=name + ': slices, surface', Input=together)
-    frames = FeatureEdges(registrationName=name + ': slices, frames', Input=surface)
-    setp(frames, BoundaryEdges=1, FeatureEdges=0, NonManifoldEdges=0, ManifoldEdges=0, Coloring=0)
-    show_lines(frames, v)
-    place_parallel(v, [0.0, left - gap, -0.2 * top, top], aspect)
 
 
 def place_parallel(v, box, aspect):
@@ -391,24 +335,41 @@ def show_image(panel, reader, array, v, aspect):
     place_parallel(v, [bounds[0], bounds[1], bounds[2], bounds[3] + room], aspect)
 
 
-# ------------------------------------------------------------------------------------------------------------ figure
-
-SLICES = 0.3  # the share of a panel's height that its slices take
-
+@LOOK@# ------------------------------------------------------------------------------------------------------------ figure
 
 def is_image(panel):
     return panel['dimensions'][2] == 1
 
 
-def default_size(columns, rows):
-    """As many pixels as fit the panels' shapes, within what a display or a page holds."""
-    width = smallest(800, 3200 // columns)
+def panel_grid():
+    """Columns and rows of panels."""
+    columns = len(PANELS) if len(PANELS) <= 3 else int(math.ceil(math.sqrt(len(PANELS))))
+    return columns, -(-len(PANELS) // columns)
+
+
+def picture_size():
+    """SIZE, or as many pixels as fit the panels' shapes, within what a display or a page holds."""
+    if SIZE:
+        return list(SIZE)
+    columns, rows = panel_grid()
+    width = panel_width(columns)
     heights = []
     for panel in PANELS:
         b = grid_bounds(panel)
-        heights.append(width * (1.08 * (b[3] - b[2]) / (b[1] - b[0]) if is_image(panel) else 1.25))
+        heights.append(width * (1.08 * (b[3] - b[2]) / (b[1] - b[0]) if is_image(panel) else TALL))
     height = smallest(largest(largest(heights), 0.3 * width), 2.0 * width)
     return [width * columns, rows * int(height + 0.5)]
+
+
+def layout_size():
+    """The size on a display; the picture has the same shape, and its text grows with it."""
+    size = picture_size()
+    return size if size[0] <= 1600 else [1600, int(1600.0 * size[1] / size[0] + 0.5)]
+
+
+def text_size():
+    """The height of text on a display, so that captions fit their panels."""
+    return int(largest(6, smallest(24, layout_size()[0] / panel_grid()[0] / 42.0)))
 
 
 def split_cell(layout, cell, parts, horizontally):
@@ -421,27 +382,35 @@ def split_cell(layout, cell, parts, horizontally):
     return cells + [cell]
 
 
+# Inferno, which is even to the eye, also in grey: position, red, green, blue.
+INFERNO = ((0.0, 0.001, 0.000, 0.014), (0.125, 0.122, 0.048, 0.282), (0.25, 0.342, 0.062, 0.429),
+           (0.375, 0.550, 0.134, 0.412), (0.5, 0.736, 0.216, 0.330), (0.625, 0.890, 0.349, 0.203),
+           (0.75, 0.978, 0.557, 0.035), (0.875, 0.976, 0.802, 0.171), (1.0, 0.988, 0.998, 0.645))
+GREY = ((0.0, 0.0, 0.0, 0.0), (1.0, 1.0, 1.0, 1.0))
+
+
 def prepare_colours():
-    """Fixed ranges for who colours by another array, so that two volumes can be compared; no fog in `rgba`."""
+    """Fixed ranges, so that two volumes can be compared; no fog in `rgba`."""
+    points = INFERNO if COLOR_BY == 'ambient_occlusion' else GREY
     setp(GetColorTransferFunction('ambient_occlusion'), AutomaticRescaleRangeMode='Never', ColorSpace='RGB',
-         RGBPoints=[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], ScalarRangeInitialized=1.0)
+         RGBPoints=[v for point in points for v in point], ScalarRangeInitialized=1.0)
     setp(GetColorTransferFunction('rgba'), AutomaticRescaleRangeMode='Never')
     setp(GetOpacityTransferFunction('rgba'), ScalarRangeInitialized=1,
          Points=[v for x, y in ((0.0, 0.0), (127.0, 0.0), (128.0, 1.0), (255.0, 1.0)) for v in (x, y, 0.5, 0.0)])
 
 
-def centre_of(solids):
+def centre_of(panels, readers):
     """Where the volumes are cut and sliced, unless CUT says otherwise: half of what is in them lies on either side.
 
     The middle of their bounds could fall between two bodies; this layer always goes through one of them.
     """
-    points = [point for panel, reader in solids for point in body_points(reader, panel)]
+    points = [point for panel, reader in zip(panels, readers) for point in body_points(reader, panel)]
     if points:
         centre = [sorted(point[a] for point in points)[(len(points) - 1) // 2] for a in range(3)]
     else:
-        centre = middle_of(grid_bounds(solids[0][0]))
+        centre = middle_of(grid_bounds(panels[0]))
     for a in range(3):  # on to the next face between voxels, so that no rounding decides what is cut off
-        o, s = solids[0][0]['origin'][a], solids[0][0]['spacing'][a]
+        o, s = panels[0]['origin'][a], panels[0]['spacing'][a]
         centre[a] = o + (math.floor((centre[a] - o) / s + 0.5) + 0.5) * s
     if CUT is not None and CUT[0] == 'octant' and CUT[1] is not None:
         centre = list(CUT[1])
@@ -454,45 +423,36 @@ def build_figure():
     """Builds the layout; returns it and the picture's size."""
     if not PANELS:
         stop('this state has no volume to show')
-    columns = len(PANELS) if len(PANELS) <= 3 else int(math.ceil(math.sqrt(len(PANELS))))
-    rows = -(-len(PANELS) // columns)
-    size = list(SIZE or default_size(columns, rows))
+    columns, rows = panel_grid()
+    size = picture_size()
     shape = (size[0] / columns) / (size[1] / rows)
 
     prepare_colours()
     readers = [read_panel(panel) for panel in PANELS]
     arrays = [colour_array(reader, panel) for reader, panel in zip(readers, PANELS)]
-    solids = [(panel, reader) for panel, reader in zip(PANELS, readers) if not is_image(panel)]
-    centre = centre_of(solids) if solids else None
-    whole = union_of([grid_bounds(panel) for panel, _ in solids]) if solids else None
-
     layout = CreateLayout(name='Figure')
     cells = [cell for row in split_cell(layout, 0, rows, False) for cell in split_cell(layout, row, columns, True)]
-    first = None
-    for panel, reader, array, cell in zip(PANELS, readers, arrays, cells):
-        name = panel['caption'] or panel['file']
-        v = make_view(name, is_image(panel))
+    views = []
+    for panel, cell in zip(PANELS, cells):
+        views.append(make_view(panel['caption'] or panel['file'], is_image(panel)))
+        AssignViewToLayout(view=views[-1], layout=layout, hint=cell)
+    everything = list(zip(PANELS, readers, arrays, views))
+    solids = [one for one in everything if not is_image(one[0])]
+    for panel, reader, array, v in everything:
         if is_image(panel):
-            AssignViewToLayout(view=v, layout=layout, hint=cell)
             show_image(panel, reader, array, v, shape)
-        else:
-            upper = layout.SplitVertical(cell, 1.0 - SLICES)
-            AssignViewToLayout(view=v, layout=layout, hint=upper)
-            show_volume(panel, reader, array, centre, v)
-            place_camera(v, whole, shape / (1.0 - SLICES), 0.07)
-            if first is None:
-                first = v
-            else:  # turning one volume turns them all
-                AddCameraLink(first, v, 'camera of ' + name)
-            s = make_view('Slices: ' + name, True)
-            AssignViewToLayout(view=s, layout=layout, hint=upper + 1)
-            show_slices(panel, reader, array, centre, s, shape / SLICES)
+    if solids:
+        panels, files, colours, seen = [list(column) for column in zip(*solids)]
+        show_solids(panels, files, colours, seen, centre_of(panels, files), shape)
+        for panel, v in zip(panels[1:], seen[1:]):  # turning one volume turns them all
+            AddCameraLink(seen[0], v, 'camera of ' + (panel['caption'] or panel['file']))
+        SetActiveView(seen[0])
+    for panel, v in zip(PANELS, views):
         if panel['caption']:
             show_caption(panel['caption'], v)
-    layout.SetSize(size)
+    show_bar(views[-1])
+    layout.SetSize(layout_size())
     SetActiveSource(readers[0])
-    if first is not None:
-        SetActiveView(first)
     return layout, size
 
 
@@ -501,7 +461,10 @@ def save_picture(layout, size):
     target = os.path.normpath(os.path.join(folder, SCREENSHOT))
     if not os.path.isdir(os.path.dirname(target)):
         os.makedirs(os.path.dirname(target))
-    SaveScreenshot(target, layout, ImageResolution=size, SeparatorWidth=0, SeparatorColor=[1.0, 1.0, 1.0])
+    for d in BILLBOARDS:  # of all text only these do not grow with the picture
+        setp(d, FontSize=int(text_size() * size[0] / layout_size()[0] + 0.5))
+    SaveScreenshot(target, layout, ImageResolution=size, SeparatorWidth=0, SeparatorColor=[1.0, 1.0, 1.0],
+                   FontScaling='Scale fonts proportionally')
     print('wrote ' + target)
 
 

@@ -19,6 +19,7 @@
 
 pub mod accel;
 pub mod geometry;
+pub mod input;
 pub mod inspect;
 pub mod io;
 pub mod mesh;
@@ -27,5 +28,8 @@ pub mod pipeline;
 pub mod progress;
 pub mod render;
 pub mod scene;
+pub mod session;
+pub mod stages;
+pub mod text;
 pub mod trace;
 pub mod volume;

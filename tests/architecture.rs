@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 
 /// From the ground up; modules on one floor don't know each other.
 const FLOORS: &[&[&str]] = &[
-    &["geometry", "progress"],
+    &["geometry", "input", "progress", "text"],
     &["volume", "mesh"],
     &["io"],
     &["scene", "accel"],
     &["trace"],
     &["occlusion"],
     &["render"],
-    &["inspect", "pipeline"],
+    &["session"],
+    &["inspect", "stages"],
+    &["pipeline"],
 ];
 
 fn floor(module: &str) -> usize {
@@ -66,8 +68,6 @@ fn no_module_uses_one_above_or_beside_it() {
 /// Circles that are still there, each by its files; one that is gone is to be crossed out here.
 const KNOWN_CIRCLES: &[&[&str]] = &[
     &["cli/console.rs", "cli/options.rs"],
-    &["pipeline/figure.rs", "pipeline/limits.rs", "pipeline/run.rs"],
-    &["pipeline/plan/occlusion.rs", "pipeline/plan/render.rs", "pipeline/plan/resolve.rs", "pipeline/plan/write.rs"],
     &["render/occlude.rs", "render/renderer.rs"],
     &["scene/hypersphere.rs", "scene/polytope.rs"],
 ];

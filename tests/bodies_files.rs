@@ -393,7 +393,11 @@ fn wrong_images_are_told() {
         (json!({"file": "empty.nii"}), 1.0, ["empty.nii", "is empty"]),
         (json!({"file": "none.nii"}), 1.0, ["can't read", "none.nii"]),
         (json!({"file": "short.nii"}), 1.0, ["short.nii", "is cut off: 34320 bytes of values from byte 352 on"]),
-        (json!({"file": "short.nii.gz"}), 1.0, ["isosurface.field.image.file", "slice"]),
+        (
+            json!({"file": "short.nii.gz"}),
+            1.0,
+            ["isosurface.field.image.file", "is cut off: its values end after the first"],
+        ),
         (json!({"file": "plain.tif"}), 1.0, ["isosurface.field.image", "one step of time only"]),
         (
             json!({"file": "plain.tif", "dimensions": [13, 12, 5, 5]}),
@@ -404,7 +408,7 @@ fn wrong_images_are_told() {
         (json!({"file": "hdf.nc"}), 1.0, ["hdf.nc", "nccopy"]),
         (json!({"file": "text.nrrd"}), 1.0, ["text.nrrd", "is no NRRD file"]),
         (json!({"file": "ball.png"}), 1.0, ["ball.png", "must end in one of .vti"]),
-        (json!({"files": ["a.vti", "b.vti"]}), 1.0, ["b.vti has [12, 13, 11, 1] points", "unlike the first file"]),
+        (json!({"files": ["a.vti", "b.vti"]}), 1.0, ["b.vti: has [12, 13, 11, 1] points", "unlike the first file"]),
         (json!({"files": ["a.vti", "c.vti"]}), 1.0, ["isosurface.field.image.files", "c.vti"]),
         (json!({"files": ["a.vti", "a.vti"], "array": "mass"}), 1.0, ["no array \"mass\"", "there are density"]),
         (json!({}), 1.0, ["isosurface.field.image", "give one of file and files"]),

@@ -1,31 +1,17 @@
 //! Files cut off and damaged at random, in every format that a scene reads: each is read or refused, and never a panic.
 //!
-//! The damage is drawn from a seed, so that what is found can be found again. Two seconds by default;
-//! `AO4D_FUZZ_SECONDS=600` looks longer, `AO4D_FUZZ_SEED=7` elsewhere.
+//! How long it looks, and where: `support/fuzz.rs`.
+
+#[path = "support/fuzz.rs"]
+mod fuzz;
 
 use std::io::Write;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use ao4d::scene::{ObjectSpec, build_object};
+use fuzz::damage;
 use serde_json::{Value, json};
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        if n == 0 { 0 } else { (self.next() % n as u64) as usize }
-    }
-}
 
 const POINTS: [usize; 4] = [4, 3, 3, 2];
 
@@ -182,58 +168,9 @@ fn vtk(binary: bool) -> Vec<u8> {
     bytes
 }
 
-/// What hides in a header where damage hurts most.
-const NASTY: [&[u8]; 12] = [
-    b"-1",
-    b"0",
-    b"4294967295",
-    b"18446744073709551615",
-    b"1e999",
-    b"nan",
-    &[0xff; 4],
-    &[0xff; 8],
-    &[0, 0, 0, 0x80],
-    &[0; 8],
-    b"\n\n",
-    b" ",
-];
-
-fn damage(original: &[u8], random: &mut Random) -> Vec<u8> {
-    let mut bytes = original.to_vec();
-    for _ in 0..=random.below(4) {
-        let at = random.below(bytes.len());
-        match random.below(7) {
-            0 => bytes.truncate(at),
-            1 if at < bytes.len() => bytes[at] = random.next() as u8,
-            2 if at < bytes.len() => bytes[at] ^= 1 << random.below(8),
-            3 => {
-                let nasty = NASTY[random.below(NASTY.len())];
-                let end = if random.below(2) == 0 { at } else { (at + nasty.len()).min(bytes.len()) };
-                bytes.splice(at..end, nasty.iter().copied());
-            }
-            4 => {
-                // A piece of the file elsewhere, or again.
-                let piece = bytes[at..(at + random.below(40)).min(bytes.len())].to_vec();
-                let to = random.below(bytes.len());
-                bytes.splice(to..to, piece);
-            }
-            5 => drop(bytes.drain(at..(at + random.below(20)).min(bytes.len()))),
-            _ => {
-                // A number in a text becomes another.
-                if let Some(digit) = bytes[at..].iter().position(u8::is_ascii_digit) {
-                    bytes[at + digit] = b"0123456789-."[random.below(12)];
-                }
-            }
-        }
-    }
-    bytes
-}
-
 #[test]
 fn damaged_files_are_read_or_refused() {
-    let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().expect("a whole number"));
-    let time = Duration::from_secs(number("AO4D_FUZZ_SECONDS").unwrap_or(2));
-    let mut random = Random(number("AO4D_FUZZ_SEED").unwrap_or(1));
+    let (time, mut random) = (fuzz::time(), fuzz::random());
     let folder = tempfile::tempdir().unwrap();
     let meshes = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/meshes");
     let nrrd = "NRRD0004\n# c\ntype: uint8\ndimension: 4\nsizes: 4 3 3 2\nspacings: 1 1 2 1\n";
@@ -322,6 +259,7 @@ fn damaged_files_are_read_or_refused() {
             }
         }
     }
+    println!("{} files in {} s", read.iter().chain(&refused).sum::<u32>(), start.elapsed().as_secs());
     for (i, (name, original, _)) in files.iter().enumerate() {
         println!("{name}: {} read, {} refused", read[i], refused[i]);
         assert!(original.len() > 10_000 || refused[i] > 0, "{name} was never refused");

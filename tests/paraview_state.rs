@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use ao4d::io::paraview::{Axis, Cut, Figure, Panel, Source, state};
+use ao4d::io::paraview::{Axis, ColorBy, Cut, Figure, Panel, Source, Style, state};
 use ao4d::volume::Grid;
 
 /// A small image: its grid, and the colour of each voxel, none where there is nothing.
@@ -23,24 +23,29 @@ impl Image {
         Image { grid, voxels: voxels.map(colour).collect() }
     }
 
-    /// As `.vti`, in characters, so that these tests stand on no writer of the library.
+    /// As `.vti`, in characters, so that these tests stand on no writer of the library. Ambient occlusion is a tenth in
+    /// red voxels, else 1; bodies are told apart by their red.
     fn write_vti(&self, path: &Path) {
         let [x, y, z] = self.grid.dimensions.map(|n| n - 1);
         let ([ox, oy, oz], [sx, sy, sz]) = (self.grid.origin, self.grid.spacing);
-        let (mut rgba, mut opacity) = (String::new(), String::new());
+        let (mut rgba, mut opacity, mut occlusion, mut object) = <(String, String, String, String)>::default();
         for voxel in &self.voxels {
             let [r, g, b] = voxel.unwrap_or([255; 3]);
             let opaque = u8::from(voxel.is_some());
             write!(rgba, "{r} {g} {b} {} ", 255 * opaque).unwrap();
             write!(opacity, "{opaque} ").unwrap();
+            write!(occlusion, "{} ", if r > g { 0.1 } else { 1.0 }).unwrap();
+            write!(object, "{} ", opaque * (1 + u8::from(r > g))).unwrap();
         }
         let text = format!(
             r#"<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
 <ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{ox} {oy} {oz}" Spacing="{sx} {sy} {sz}">
-<Piece Extent="0 {x} 0 {y} 0 {z}"><PointData Scalars="rgba">
+<Piece Extent="0 {x} 0 {y} 0 {z}"><PointData Scalars="opacity">
 <DataArray type="UInt8" Name="rgba" NumberOfComponents="4" format="ascii">{rgba}</DataArray>
 <DataArray type="Float32" Name="opacity" format="ascii">{opacity}</DataArray>
+<DataArray type="Float32" Name="ambient_occlusion" format="ascii">{occlusion}</DataArray>
+<DataArray type="UInt16" Name="object" format="ascii">{object}</DataArray>
 </PointData></Piece></ImageData></VTKFile>"#
         );
         fs::write(path, text).unwrap();
@@ -95,6 +100,9 @@ fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
         cut: Cut::Octant { corner: None },
         screenshot: Some("figure.png".into()),
         size: Some([800, 500]),
+        style: Style::Voxels,
+        color_by: ColorBy::Rgba,
+        colorbar: false,
     }
 }
 
@@ -261,6 +269,13 @@ fn no_axis_is_mirrored() {
             let exact = |channel: usize| count(&part, |c| (0..3).all(|k| c[k] == if k == channel { 200 } else { 0 }));
             assert!(exact(right) > 100 && exact(up) > 100, "the colours of {file} are not shown as they are");
         }
+        figure.style = Style::Surface;
+        write_state(folder.path(), &figure);
+        draw("pvbatch", &[Path::new("figure.py")], folder.path());
+        let volume = Picture::read(&folder.path().join("figure.png")).part([0.0, 1.0], [0.0, 1.0]);
+        let [red, green, blue] = [0, 1, 2].map(|channel| centre(&volume, channel));
+        assert!(red[0] > green[0] && green[0] > blue[0], "x is not to the right: {red:?} {green:?} {blue:?}");
+        assert!(green[1] < red[1] && red[1] < blue[1], "y is not up: {red:?} {green:?} {blue:?}");
     };
     axes.write_vti(&folder.path().join("axes.vti"));
     check(Source::Vti, "axes.vti");
@@ -298,11 +313,114 @@ fn images_plane_cuts_and_empty_volumes() {
     assert!(count(&empty, |c| c == [255; 3]) > 180_000, "an empty volume is not white");
     assert!(count(&empty, |c| c != [255; 3]) > 500, "an empty volume has its outline");
 
+    // The other look: an image as it is, nothing at all, and a solid that the image's border closes.
+    let plain = picture;
+    write_state(folder.path(), &Figure { style: Style::Surface, ..figure.clone() });
+    draw("pvbatch", &[Path::new("figure.py")], folder.path());
+    let picture = Picture::read(&folder.path().join("figure.png"));
+    let flat = picture.part([0.0, 1.0 / 3.0], [0.0, 1.0]);
+    for grey in [60, 204] {
+        assert!(count(&flat, |c| c == [grey; 3]) > 15_000, "the image is not seen");
+    }
+    let empty = picture.part([1.0 / 3.0, 2.0 / 3.0], [0.0, 1.0]);
+    assert!(count(&empty, |c| c == [255; 3]) > 180_000, "an empty volume is not white");
+    let solid = picture.part([2.0 / 3.0, 1.0], [0.0, 1.0]);
+    assert!(count(&solid, |c| (60..230).contains(&c[0])) > 20_000, "the solid is not seen");
+    let picture = plain;
+
     // The plane takes layers 4 to 7 away, and lays bare layer 3, dimmed by its direction.
     let solid = picture.part([2.0 / 3.0, 1.0], [0.0, 0.7]);
     assert!(count(&solid, |c| c[0] > 50 && c[0] < 79) > 5000, "the layer behind the plane is not laid bare");
     let slices = picture.part([2.0 / 3.0, 7.0 / 9.0], [0.75, 0.88]);
     assert!(count(&slices, |c| c == [77; 3]) > 3000, "the slice is not the layer at the plane");
+}
+
+/// Two balls that touch, red and blue, on a floor that goes on beyond the image, and a rod one voxel thick.
+fn still_life() -> Image {
+    let grid = cube(40);
+    Image::new(grid, |index| {
+        let [x, y, z] = grid.point(index);
+        let ball = |cx: f64| ((x - cx).powi(2) + y * y + z * z).sqrt() < 0.4;
+        let rod = index[1] == 34 && index[2] == 20;
+        match y {
+            _ if ball(-0.4) => Some([200, 0, 0]),
+            _ if ball(0.4) => Some([0, 0, 200]),
+            _ if y < -0.6 || rod => Some([0, 200, 0]),
+            _ => None,
+        }
+    })
+}
+
+fn surface(panels: &[(&str, &str, &Image)]) -> Figure {
+    Figure { style: Style::Surface, cut: Cut::None, size: Some([900, 800]), ..figure(Source::Vti, panels) }
+}
+
+/// A pixel's hue where it has one: the channel that stands out.
+fn hue(c: [u8; 3]) -> Option<usize> {
+    (0..3).find(|&k| (0..3).all(|j| j == k || i32::from(c[k]) > 2 * i32::from(c[j]) + 30))
+}
+
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn bodies_have_smooth_skins_in_their_own_colours() {
+    let folder = scratch();
+    let image = still_life();
+    image.write_vti(&folder.path().join("a.vti"));
+    let path = folder.path().join("figure.png");
+    let draw_figure = |figure: &Figure| {
+        write_state(folder.path(), figure);
+        draw("pvbatch", &[Path::new("figure.py")], folder.path());
+        Picture::read(&path)
+    };
+    let whole = draw_figure(&surface(&[("a.vti", "caption", &image)]));
+    assert_eq!((whole.width, whole.height), (900, 800));
+    let pixels = whole.part([0.0, 1.0], [0.0, 1.0]);
+    for channel in 0..3 {
+        let seen = count(&pixels, |c| hue(c) == Some(channel));
+        assert!(seen > 8000, "channel {channel} is seen in {seen} pixels");
+    }
+    // No white rims: between red or blue inside and the white ground there are only the pixels of the edge itself.
+    let rims = count(&pixels, |c| c.iter().filter(|&&v| (90..250).contains(&v)).count() == 3 && hue(c).is_none());
+    assert!(rims < 16_000, "{rims} pale pixels: frame, text and edges are fewer");
+    // The rod, one voxel thick, is there: green above the balls.
+    let above = whole.part([0.1, 0.9], [0.05, 0.35]);
+    assert!(count(&above, |c| hue(c) == Some(1)) > 1500, "what is one voxel thick is lost");
+    // Smooth: light changes little from pixel to pixel on the ball, where boxes have steps.
+    let red = |x: usize, y: usize| Some(whole.pixels[x + 900 * y]).filter(|&c| hue(c) == Some(0)).map(|c| c[0]);
+    let (mut steps, mut places) = (0, 0);
+    for (x, y) in (100..800).flat_map(|x| (100..700).map(move |y| (x, y))) {
+        if let (Some(a), Some(b), Some(_), Some(_)) = (red(x, y), red(x + 1, y), red(x - 3, y), red(x + 4, y)) {
+            places += 1;
+            steps += usize::from(a.abs_diff(b) > 8);
+        }
+    }
+    assert!(places > 8000 && steps * 100 < places, "{steps} steps in {places} places");
+
+    // Cut by a plane through the balls' middles: caps in their colours, flat, and nothing in front.
+    let mut cut = surface(&[("a.vti", "", &image)]);
+    cut.cut = Cut::Plane { axis: Axis::Z, at: 0.0 };
+    let opened = draw_figure(&cut);
+    let inside = opened.part([0.0, 1.0], [0.0, 1.0]);
+    let caps = |channel: usize| {
+        let mut shades = std::collections::BTreeMap::<u8, usize>::new();
+        let seen = inside.iter().filter(|p| hue(p.1) == Some(channel));
+        seen.for_each(|p| *shades.entry(p.1[channel]).or_default() += 1);
+        shades.values().copied().max().unwrap_or(0)
+    };
+    assert!(caps(0) > 8000 && caps(2) > 8000, "the caps are not flat: {} and {}", caps(0), caps(2));
+    cut.cut = Cut::Octant { corner: None };
+    assert!(draw_figure(&cut).pixels != opened.pixels, "an octant is not a plane");
+
+    // By the colour map: what is a tenth open is dark, what is open is bright, and there is a bar with both.
+    let mut mapped = surface(&[("a.vti", "", &image)]);
+    (mapped.color_by, mapped.colorbar) = (ColorBy::AmbientOcclusion, true);
+    let mapped = draw_figure(&mapped);
+    let (middle, foot) = (mapped.part([0.0, 1.0], [0.1, 0.8]), mapped.part([0.2, 0.8], [0.86, 1.0]));
+    let dark = |c: [u8; 3]| c.iter().all(|&v| v < 90);
+    assert!(count(&middle, dark) > 8000, "what is occluded is not dark");
+    assert!(count(&middle, |c| c[0] > 180 && c[1] > 180 && c[2] < 170) > 30_000, "what is open is not bright");
+    let orange = |c: [u8; 3]| c[0] > 200 && (80..190).contains(&c[1]) && c[2] < 80;
+    assert!(count(&foot, dark) > 100 && count(&foot, orange) > 100, "there is no colour bar");
 }
 
 #[test]
@@ -339,12 +457,19 @@ fn the_text_is_sound_python() {
     let caption = "it's \\ \"\u{3b1}\u{1f600}\" @SIZE@\n";
     let mut figure = figure(Source::Vti, &[("a.vti", caption, &image)]);
     figure.cut = Cut::Plane { axis: Axis::Y, at: 1.0 / 3.0 };
-    let path = write_state(folder.path(), &figure);
+    figure.style = Style::Surface;
+    check_text(&write_state(folder.path(), &figure), caption);
+    figure.style = Style::Voxels;
+    check_text(&write_state(folder.path(), &figure), caption);
+}
+
+/// Has Python read a state, and looks at its constants.
+fn check_text(path: &Path, caption: &str) {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let python = std::env::var_os("AO4D_PYTHON").map_or_else(|| here.join(".venv/bin/python"), PathBuf::from);
     let output = Command::new(&python)
         .arg(here.join("tests/python/check_state.py"))
-        .arg(&path)
+        .arg(path)
         .output()
         .unwrap_or_else(|e| panic!("{} does not start: {e}; run tests/install", python.display()));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use ao4d::io::vtk;
-use ao4d::pipeline::plan::OcclusionSource;
-use ao4d::pipeline::spec::Method;
 use ao4d::pipeline::{Pipeline, Report, Settings, run};
 use ao4d::progress::Silent;
+use ao4d::stages::occlusion::OcclusionSource;
+use ao4d::stages::paraview::FigurePlan;
+use ao4d::stages::write::{Format, WritePlan};
 
 /// All `.yaml` files below `pipelines/`.
 fn pipelines() -> Vec<PathBuf> {
@@ -43,10 +44,10 @@ fn every_pipeline_leaves_what_it_promises() {
         let report = run(&pipeline, &Settings::default(), &Silent).unwrap();
         assert_eq!(report.notes, Vec::<String>::new(), "{}", path.display());
         println!("{}: {:.2} s", path.display(), report.seconds);
-        for write in &pipeline.plan.writes {
-            let render = &pipeline.plan.renders[write.render];
+        for (_, write) in pipeline.plan.all::<WritePlan>() {
+            let render = &pipeline.plan[write.render];
             let voxels = render.voxels() as usize;
-            if let Some(file) = &write.vti {
+            if let Some(file) = write.files.get(Format::Vti) {
                 let image = vtk::read_volume(&folder.path().join(file)).unwrap();
                 assert_eq!(image.grid.dimensions, render.dimensions);
                 let names: Vec<&str> = image.arrays.iter().map(|a| a.name.as_str()).collect();
@@ -60,18 +61,19 @@ fn every_pipeline_leaves_what_it_promises() {
                 let mut greys = image.array("ambient_occlusion").unwrap().values.to_f64();
                 greys.sort_by(f64::total_cmp);
                 greys.dedup();
-                let published = render.occlusion.is_some_and(|o| match &pipeline.plan.occlusions[o].source {
-                    OcclusionSource::Compute(computation) => computation.method == Method::AsPublished,
+                let published = render.occlusion.is_some_and(|o| match &pipeline.plan[o].source {
+                    OcclusionSource::Compute(computation) => computation.method.is_of_the_thesis(),
                     OcclusionSource::Load(_) => false,
                 });
                 let enough = if published { 2 } else { 1 + 2 * usize::from(render.occlusion.is_some()) };
                 assert!(greys.len() >= enough && (greys.len() == 1) == render.occlusion.is_none());
             }
-            if let Some(file) = &write.raw {
+            if let Some(file) = write.files.get(Format::Raw) {
                 assert_eq!(std::fs::metadata(folder.path().join(file)).unwrap().len(), 12 * voxels as u64);
             }
         }
-        let screenshots: Vec<_> = pipeline.plan.figures.iter().filter_map(|f| f.screenshot.as_ref()).collect();
+        let figures = pipeline.plan.all::<FigurePlan>();
+        let screenshots: Vec<_> = figures.filter_map(|(_, figure)| figure.screenshot.as_deref()).collect();
         for file in pipeline.plan.files() {
             // ParaView makes the screenshot, not the run.
             assert_eq!(folder.path().join(file).is_file(), !screenshots.contains(&file), "{}", file.display());

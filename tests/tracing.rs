@@ -7,6 +7,7 @@ use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64};
 use ao4d::mesh::{Mesh, Surface};
 use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
+use ao4d::render::filters::{Denoise, Dilate};
 use ao4d::render::{Aov, Camera, Projection, Renderer, Shading, Slab, View};
 use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
 use ao4d::trace::{NOTHING, RayBackend, Sampling};
@@ -261,12 +262,19 @@ fn slabs<const D: usize>() {
     let values = (0..count).map(|i| (i % 10) as f32 / 10.0).collect();
     let estimates = Arc::new(Estimates { values, errors: vec![0.01; count], rays: 0 });
     let sobol = Estimator::Sampled(Sampling::new(16, 1));
-    for shading in
-        [Shading::Flat(Arc::clone(&estimates)), Shading::Smooth(Arc::clone(&estimates)), Shading::Voxel(sobol)]
-    {
+    for (shading, filtered) in [
+        (Shading::Flat(Arc::clone(&estimates)), false),
+        (Shading::Smooth(Arc::clone(&estimates)), true),
+        (Shading::Voxel(sobol), false),
+        (Shading::Auto(Arc::clone(&estimates), sobol), true),
+    ] {
         for supersample in [1, 2, 3] {
             let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading.clone());
             renderer.supersample = supersample;
+            if filtered {
+                renderer.filters.push(Box::new(Denoise::new(&camera, &renderer.grid, 16)));
+                renderer.filters.push(Box::new(Dilate { layers: 3 }));
+            }
             let whole = renderer.volume(Aov::ALL, &Silent).unwrap().arrays;
             for (thickness, threads) in [(1, 1), (2, 3), (7, 2), (100, 1)] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -7,11 +7,15 @@ use std::sync::Arc;
 use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
-use ao4d::pipeline::{AnyMesh, Pipeline, camera};
+use ao4d::pipeline::Pipeline;
 use ao4d::progress::Silent;
 use ao4d::render::visibility::Method;
 use ao4d::render::{Camera, NOTHING, Projection, View, Visibility};
 use ao4d::scene::{ObjectSpec, build_object};
+use ao4d::stages::Ref;
+use ao4d::stages::camera::camera;
+use ao4d::stages::render::RenderPlan;
+use ao4d::stages::scene::{AnyMesh, ScenePlan};
 use ao4d::trace::RayBackend;
 use ao4d::trace::cpu::CpuBackend;
 use serde_json::{Value, json};
@@ -203,13 +207,13 @@ fn neither_threads_nor_slabs_change_anything() {
     sliced::<4>();
 }
 
-fn pipeline_scene<const D: usize>(name: &str, pipeline: &Pipeline, scene: usize, mesh: &Mesh<D>) -> usize {
-    let renders = pipeline.plan.renders.iter().filter(|r| r.scene == scene);
+fn pipeline_scene<const D: usize>(name: &str, pipeline: &Pipeline, scene: Ref<ScenePlan>, mesh: &Mesh<D>) -> usize {
+    let renders = pipeline.plan.all::<RenderPlan>().filter(|(_, r)| r.scene == scene);
     renders
-        .map(|render| {
+        .map(|(stage, render)| {
             let dimensions = render.dimensions.map(|n| n.min(if D == 3 { 90 } else { 36 }));
             let seen = agree(name, mesh, &camera(&render.camera).unwrap(), dimensions);
-            println!("{name}, {}: {seen} voxels see something", render.id);
+            println!("{name}, {}: {seen} voxels see something", pipeline.plan.id(stage));
             seen
         })
         .sum()
@@ -228,8 +232,8 @@ fn every_pipelines_pictures() {
         let name = file.file_name().unwrap().to_string_lossy();
         let pipeline = Pipeline::load(&file, &[], None).unwrap();
         let mut seen = 0;
-        for scene in 0..pipeline.plan.scenes.len() {
-            seen += match AnyMesh::build(&pipeline.plan, scene, &mut Vec::new()).unwrap() {
+        for (scene, _) in pipeline.plan.all::<ScenePlan>() {
+            seen += match AnyMesh::build(&pipeline.plan, scene, &mut Vec::new(), &Silent).unwrap() {
                 AnyMesh::Three(mesh) => pipeline_scene(&name, &pipeline, scene, &mesh),
                 AnyMesh::Four(mesh) => pipeline_scene(&name, &pipeline, scene, &mesh),
             };

@@ -14,9 +14,12 @@ use ao4d::accel::Tracer;
 use ao4d::geometry::{Cone, narrow, normal_of, widen};
 use ao4d::mesh::Mesh;
 use ao4d::occlusion::Estimator;
-use ao4d::pipeline::{AnyMesh, Pipeline, camera};
+use ao4d::pipeline::Pipeline;
 use ao4d::progress::Silent;
 use ao4d::render::{NOTHING, Visibility, visibility};
+use ao4d::stages::camera::camera;
+use ao4d::stages::render::RenderPlan;
+use ao4d::stages::scene::{AnyMesh, ScenePlan};
 use ao4d::trace::cpu::CpuBackend;
 use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 use rustix::time::{ClockId, clock_gettime};
@@ -49,7 +52,7 @@ fn some<T: Copy>(all: &[T]) -> Vec<T> {
 }
 
 fn measure<const D: usize>(name: &str, pipeline: &Pipeline, mesh: Mesh<D>) {
-    let Some(render) = pipeline.plan.renders.iter().find(|render| render.scene == 0) else { return };
+    let Some((_, render)) = pipeline.plan.all::<RenderPlan>().next() else { return };
     let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(mesh)));
     backend.tracer().prepare_wide();
     let mesh = backend.tracer().mesh();
@@ -101,7 +104,9 @@ fn main() {
     for file in files {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let pipeline = Pipeline::load(&file, &[], None).unwrap_or_else(|error| panic!("{error}"));
-        match AnyMesh::build(&pipeline.plan, 0, &mut Vec::new()).unwrap_or_else(|error| panic!("{error}")) {
+        let Some((scene, _)) = pipeline.plan.all::<ScenePlan>().next() else { continue };
+        match AnyMesh::build(&pipeline.plan, scene, &mut Vec::new(), &Silent).unwrap_or_else(|error| panic!("{error}"))
+        {
             AnyMesh::Three(mesh) => measure(&name, &pipeline, mesh),
             AnyMesh::Four(mesh) => measure(&name, &pipeline, mesh),
         }

@@ -1,6 +1,6 @@
 //! `ao4d check`: everything short of running.
 
-use ao4d::pipeline::Backend;
+use ao4d::pipeline::{Backend, RunError};
 use ao4d::trace::opencl::OpenCl;
 use clap::Args;
 
@@ -24,9 +24,10 @@ impl Check {
         if let Backend::OpenCl(places) = &settings.backend {
             OpenCl::open(places).map_err(|error| Failure::Failed(Box::new(error)))?;
         }
+        let pool = settings.pool().map_err(RunError::from)?;
         for pipeline in &pipelines {
-            let prepared = pipeline.prepare(|_| true)?;
-            prepared.notes.iter().for_each(|note| console.note(&format!("note: {note}")));
+            let prepared = pool.install(|| pipeline.prepare(|_| true))?;
+            prepared.notes.iter().flatten().for_each(|note| console.note(&format!("note: {note}")));
             let counts = prepared.counts();
             let description = pipeline.plan.describe(&counts);
             if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;

@@ -1,10 +1,13 @@
 //! What is printed where.
 //!
 //! `println!` panics when the reader at the other end of a pipe has gone (`ao4d schema | head -1`). Here that is
-//! the end of printing, and nothing else.
+//! the end of printing, and nothing else. Names and paths from outside stand in much of it, so whatever a terminal
+//! would obey is shown instead.
 
 use std::error::Error;
 use std::io::{self, IsTerminal, Write};
+
+use ao4d::text::for_terminal;
 
 use super::Failure;
 use super::options::Messages;
@@ -34,7 +37,7 @@ impl Console {
     pub fn result(&self, text: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
         let newline = if text.ends_with('\n') { "" } else { "\n" };
-        match write!(out, "{text}{newline}").and_then(|()| out.flush()) {
+        match write!(out, "{}{newline}", for_terminal(text)).and_then(|()| out.flush()) {
             Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
                 Err(Failure::Failed(format!("cannot write to stdout: {e}").into()))
             }
@@ -74,6 +77,7 @@ impl Console {
     }
 }
 
-fn to_stderr(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}"); // nobody is left to hear of a failure
+/// A line for stderr, whatever was asked for.
+pub fn to_stderr(text: &str) {
+    let _ = writeln!(io::stderr(), "{}", for_terminal(text)); // nobody is left to hear of a failure
 }

@@ -13,6 +13,12 @@ use super::{Failure, Outcome};
 pub struct Info {
     /// A volume, a mesh, an occlusion file
     file: PathBuf,
+    /// Of a file with several arrays, variables or images: which one
+    #[arg(long, value_name = "NAME")]
+    array: Option<String>,
+    /// Also write an image's values there, as little-endian float64, x fastest, then y, z, time
+    #[arg(long, value_name = "FILE")]
+    values: Option<PathBuf>,
     /// Print it as JSON
     #[arg(long)]
     json: bool,
@@ -21,7 +27,11 @@ pub struct Info {
 impl Info {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         super::existing(&self.file)?;
-        let info = inspect::Info::read(&self.file)?;
+        let array = self.array.as_deref();
+        let info = inspect::Info::read_array(&self.file, array)?;
+        if let Some(values) = &self.values {
+            inspect::image::write_values(&self.file, array, values)?;
+        }
         if self.json { console.json(&info) } else { console.result(&info.to_string()) }?;
         Ok(Outcome::Done)
     }

@@ -14,9 +14,13 @@ mod schema;
 mod study;
 mod watch;
 
+use std::borrow::Cow;
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
+use ao4d::pipeline::RunError;
+use ao4d::text::for_terminal;
 use clap::{Parser, Subcommand};
 
 use console::Console;
@@ -81,6 +85,16 @@ impl From<ao4d::pipeline::Error> for Failure {
     }
 }
 
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Refused(error) => Failure::Refused(Box::new(error)),
+            RunError::Cancelled(_) => Failure::Cancelled,
+            error => Failure::Failed(Box::new(error)),
+        }
+    }
+}
+
 impl From<ao4d::inspect::Error> for Failure {
     fn from(error: ao4d::inspect::Error) -> Self {
         Failure::Refused(Box::new(error))
@@ -89,7 +103,11 @@ impl From<ao4d::inspect::Error> for Failure {
 
 /// Refuses a path where there is no file.
 fn existing(file: &Path) -> Result<(), Failure> {
-    if file.is_file() { Ok(()) } else { Err(Failure::refused(format!("{}: there is no such file", file.display()))) }
+    match ao4d::input::length(file) {
+        Ok(_) => Ok(()),
+        Err(cause) if file.exists() && !file.is_dir() => Err(Failure::refused(format!("{}: {cause}", file.display()))),
+        Err(_) => Err(Failure::refused(format!("{}: there is no such file", file.display()))),
+    }
 }
 
 /// Parses the command line and does what it says.
@@ -97,8 +115,14 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(refusal) => {
-            // Help and version come this way too, with code 0. A closed pipe is no reason to fail.
-            let _ = refusal.print();
+            // Help and version come this way too, with code 0. A closed pipe is no reason to fail. A refusal quotes
+            // arguments, among them names of files; where a terminal would obey one, it goes without colours.
+            let commands = |argument: OsString| matches!(for_terminal(&argument.to_string_lossy()), Cow::Owned(_));
+            if std::env::args_os().any(commands) {
+                console::to_stderr(refusal.to_string().trim_end());
+            } else {
+                let _ = refusal.print();
+            }
             return ExitCode::from(u8::try_from(refusal.exit_code()).unwrap_or(2));
         }
     };

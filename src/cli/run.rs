@@ -1,6 +1,9 @@
 //! `ao4d run`: run a pipeline and write its files.
 
-use ao4d::pipeline::{RunError, run};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use ao4d::pipeline::{Pipeline, RunError, run};
 use clap::Args;
 
 use super::console::Console;
@@ -23,17 +26,14 @@ impl Run {
         let (pipelines, settings) = self.options.load_all(console)?;
         let watch = Watch::new(console)?;
         if pipelines.len() > 1 {
-            // What is wrong with the last is found before the first is run.
-            for pipeline in &pipelines {
-                pipeline.prepare(|_| true)?;
-            }
+            settings.pool().map_err(RunError::from)?.install(|| check_together(&pipelines))?;
         }
         let mut reports = Vec::with_capacity(pipelines.len());
         for pipeline in &pipelines {
             let report = run(pipeline, &settings, &watch).map_err(|error| match error {
-                RunError::Refused(error) => Failure::Refused(Box::new(error)),
-                RunError::Cancelled(_) => Failure::Cancelled,
-                error => Failure::Failed(Box::new(error)),
+                // Others have left their files by now.
+                RunError::Refused(error) if !reports.is_empty() => Failure::Failed(Box::new(error)),
+                error => error.into(),
             })?;
             for note in &report.notes {
                 console.note(&format!("note: {note}"));
@@ -50,4 +50,26 @@ impl Run {
         }
         Ok(Outcome::Done)
     }
+}
+
+/// Finds what is wrong with the last pipeline before the first is run. What reads a file that an earlier one writes can be
+/// tried only once that is there.
+fn check_together(pipelines: &[Pipeline]) -> Result<(), ao4d::pipeline::Error> {
+    let mut written = BTreeSet::new();
+    for pipeline in pipelines {
+        let plan = &pipeline.plan;
+        let reads_those = |stage: usize| plan.input_files(stage).iter().any(|file| written.contains(&place(file)));
+        let later: Vec<bool> = (0..plan.stages.len())
+            .map(|stage| reads_those(stage) || plan.scene_of(stage).is_some_and(|scene| reads_those(scene.index())))
+            .collect();
+        pipeline.prepare(|stage| !later[stage])?;
+        let files = (0..plan.stages.len()).flat_map(|stage| plan.all_files_of(stage));
+        written.extend(files.map(|file| place(&plan.out.join(file))));
+    }
+    Ok(())
+}
+
+/// A path as it can be compared with others.
+fn place(path: &Path) -> PathBuf {
+    path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_else(|_| path.to_owned())
 }

@@ -1,6 +1,6 @@
 //! `ao4d study`: error against time of the occlusion methods on a pipeline's scene.
 
-use ao4d::pipeline::{Backend, RunError, study};
+use ao4d::pipeline::{Backend, study};
 use clap::Args;
 
 use super::console::Console;
@@ -22,11 +22,7 @@ impl Study {
             return Err(Failure::refused("a study compares methods on the processor; use --backend cpu"));
         }
         let watch = Watch::new(console)?;
-        let study = study(&pipeline, &settings, &watch).map_err(|error| match error {
-            RunError::Refused(error) => Failure::Refused(Box::new(error)),
-            RunError::Cancelled(_) => Failure::Cancelled,
-            error => Failure::Failed(Box::new(error)),
-        })?;
+        let study = study(&pipeline, &settings, &watch)?;
         console.result(&study.markdown())?;
         for file in &study.files {
             console.note(&format!("written: {}", file.display()));

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use ao4d::progress::Progress;
+use ao4d::text::for_terminal;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
@@ -74,7 +75,7 @@ fn bar(stage: &str, total: u64) -> ProgressBar {
         _ => (ProgressBar::new(total), "{msg:24} [{bar:32}] {percent:>3} %, {eta} left"),
     };
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = bar.with_style(style.progress_chars("=> ")).with_message(stage.to_owned());
+    let bar = bar.with_style(style.progress_chars("=> ")).with_message(for_terminal(stage).into_owned());
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
 }

@@ -12,6 +12,7 @@
 mod aabb;
 mod cone;
 mod determinant;
+mod dimension;
 mod expansion;
 mod frame;
 mod ray;
@@ -20,7 +21,9 @@ mod simplex;
 
 pub use aabb::Aabb;
 pub use cone::{Cone, Crossing};
+pub(crate) use determinant::{WideInteger, cofactors};
 pub use determinant::{cross, determinant};
+pub use dimension::Dimension;
 pub use expansion::Expansion;
 pub(crate) use expansion::{two_product, two_sum};
 pub use frame::Frame;
@@ -44,14 +47,4 @@ pub fn widen<const D: usize>(v: &Vector<D>) -> Vector64<D> {
 #[inline]
 pub fn narrow<const D: usize>(v: &Vector64<D>) -> Vector<D> {
     v.map(|x| x as f32 + 0.0)
-}
-
-/// The volume of the unit ball of R^(D-1): the cosine-weighted measure of a hemisphere of R^D, pi in 3D and
-/// 4 pi / 3 in 4D (Nusselt's analogue: the cosine-weighted hemisphere projects onto that ball with constant density).
-pub const fn hemisphere_measure<const D: usize>() -> f64 {
-    match D {
-        3 => std::f64::consts::PI,
-        4 => 4.0 * std::f64::consts::PI / 3.0,
-        _ => panic!("D is 3 or 4"),
-    }
 }

@@ -1,5 +1,6 @@
 //! The exact sign of a determinant whose columns are differences of `f32` points.
 
+use super::determinant::WideInteger;
 use super::{Expansion, Vector};
 
 /// One column of a determinant: the difference of two stored points, not yet rounded.
@@ -64,7 +65,7 @@ const ENTRY_BITS: i32 = 40;
 /// less than 2^40. That is the rule: coordinates of a scene have similar sizes. About a hundred times faster than
 /// expansions, which matters where much lies exactly in one hyperplane, as on the faces of a cube.
 fn integer_sign<const D: usize>(columns: &[Column<D>; D]) -> Option<i32> {
-    let mut m = [[0i128; 4]; 4];
+    let mut m = [[0i128; D]; D];
     for (column, integers) in columns.iter().zip(&mut m) {
         let ends = column.head.iter().chain(column.tail.iter());
         let nonzero = ends.filter(|x| **x != 0.0);
@@ -82,28 +83,11 @@ fn integer_sign<const D: usize>(columns: &[Column<D>; D]) -> Option<i32> {
         }
         // Exact: a power of two times a double of at most 40 bits.
         let scale = |x: f32| (f64::from(x) * 2f64.powi(-low)) as i128;
-        for (r, integer) in integers.iter_mut().enumerate().take(D) {
+        for (r, integer) in integers.iter_mut().enumerate() {
             *integer = scale(column.head[r]) - scale(column.tail[r]);
         }
     }
-    let det2 = |a: usize, b: usize, i: usize, j: usize| m[a][i] * m[b][j] - m[a][j] * m[b][i];
-    let det3 = |a: usize, rows: [usize; 3]| {
-        let [i, j, k] = rows;
-        m[a][i] * det2(a + 1, a + 2, j, k) - m[a][j] * det2(a + 1, a + 2, i, k) + m[a][k] * det2(a + 1, a + 2, i, j)
-    };
-    if D == 3 {
-        return Some(det3(0, [0, 1, 2]).signum() as i32);
-    }
-    let minors = [det3(1, [1, 2, 3]), -det3(1, [0, 2, 3]), det3(1, [0, 1, 3]), -det3(1, [0, 1, 2])];
-    // The last sum takes 165 bits: high parts and 64-bit low parts are added apart.
-    let (mut high, mut low) = (0i128, 0i128);
-    for (entry, minor) in m[0].into_iter().zip(minors) {
-        high += entry * (minor >> 64);
-        low += entry * (minor & u128::from(u64::MAX) as i128);
-    }
-    high += low >> 64;
-    low &= u128::from(u64::MAX) as i128;
-    Some(if high != 0 { high.signum() as i32 } else { low.signum() as i32 })
+    Some(WideInteger::determinant(&m).sign())
 }
 
 /// The sign of the minor that leaves row `skip` out of D - 1 columns, exactly.

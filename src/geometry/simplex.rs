@@ -1,7 +1,7 @@
 //! Simplices of R^D: D points, a triangle in 3D and a tetrahedron in 4D.
 
 use super::sign::minor_sign;
-use super::{Column, Cone, Vector, Vector64, cross, widen};
+use super::{Column, Cone, Dimension, Vector, Vector64, cross, widen};
 
 /// The normal of a simplex: the generalised cross product of its edges from vertex 0, of length (D-1)! times its
 /// measure. Exchanging two vertices turns it round.
@@ -18,7 +18,7 @@ pub fn normal_of<const D: usize>(vertices: &[Vector64<D>; D]) -> Vector64<D> {
 
 /// The (D-1)-measure: the area of a triangle, the 3-volume of a tetrahedron.
 pub fn measure<const D: usize>(vertices: &[Vector64<D>; D]) -> f64 {
-    normal_of(vertices).norm() / if D == 3 { 2.0 } else { 6.0 }
+    normal_of(vertices).norm() / f64::from(Dimension::of::<D>().simplices_a_cube())
 }
 
 /// Whether the simplex has measure zero, exactly.
@@ -50,7 +50,7 @@ mod tests {
         let wide = corner.each_ref().map(widen);
         let normal = normal_of(&wide);
         assert_eq!(normal.norm(), 1.0);
-        assert!((measure(&wide) - if D == 3 { 0.5 } else { 1.0 / 6.0 }).abs() < 1e-16);
+        assert!((measure(&wide) - Dimension::of::<D>().pick(0.5, 1.0 / 6.0)).abs() < 1e-16);
         let ahead = Vector::<D>::from_fn(|r, _| normal[r] as f32);
         assert_eq!(plane_side(&corner, &ahead), 1);
         assert_eq!(plane_side(&corner, &-ahead), -1);

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::image::ImageSummary;
 use super::range::Short;
 use super::surface::SurfaceSummary;
 use super::{ArraySummary, COLOURS, Contents, Error, OCCLUSION, Range};
@@ -30,6 +31,8 @@ pub struct Info {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Description {
+    /// An image of a format of measurements, with time among its axes.
+    Grid(Box<ImageSummary>),
     /// An image.
     Image {
         /// Points along x, y and z.
@@ -88,10 +91,27 @@ impl Info {
     /// # Errors
     /// As [`Contents::read`].
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let contents = Contents::read(path)?;
-        let bytes = std::fs::metadata(path).map_err(|cause| Error::Open { path: path.into(), cause })?.len();
-        Ok(Self { path: path.into(), bytes, description: Description::of(&contents) })
+        Self::read_array(path, None)
     }
+
+    /// The same of one array, variable or image of several, where the format has such.
+    ///
+    /// # Errors
+    /// As [`Info::read`].
+    pub fn read_array(path: &Path, array: Option<&str>) -> Result<Self, Error> {
+        let bytes = std::fs::metadata(path).map_err(|cause| Error::Open { path: path.into(), cause })?.len();
+        let description = match is_measurement(path) {
+            true => Description::Grid(Box::new(ImageSummary::read(path, array)?)),
+            false => Description::of(&Contents::read(path)?),
+        };
+        Ok(Self { path: path.into(), bytes, description })
+    }
+}
+
+/// Whether a file's name is that of an image whose header tells more than VTK's would.
+fn is_measurement(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    crate::io::image::is_image(path) && !matches!(ending.as_str(), "vti" | "raw" | "bin" | "dat")
 }
 
 impl Description {
@@ -158,6 +178,7 @@ impl fmt::Display for Info {
 impl fmt::Display for Description {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Grid(image) => image.fmt(f),
             Self::Image { dimensions, origin, spacing, direction, point_arrays, cell_arrays, field_data } => {
                 let [x, y, z] = dimensions;
                 writeln!(f, "an image of {x} x {y} x {z} points")?;

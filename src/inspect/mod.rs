@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | `.vti`, `.vtu`, `.vtp`, `.vtk` | an image or a mesh, as [`crate::io::vtk`] reads it |
 //! | `.stl`, `.obj`, `.ply`, `.msh` | a mesh, with the cells that the file has |
+//! | `.nii`, `.nrrd`, `.nc`, `.tif` | an image, described but not compared ([`image`]) |
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
 //! | `.raw` | colours without a header: only how many |
 //!
@@ -15,6 +16,7 @@
 
 pub mod compare;
 mod error;
+pub mod image;
 mod info;
 mod range;
 pub mod surface;
@@ -116,7 +118,7 @@ pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, 
 
 /// All floats of a file whose length is a multiple of `unit` bytes.
 fn numbers(path: &Path, unit: usize, why: &'static str) -> Result<Values, Error> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     if bytes.is_empty() || bytes.len() % unit != 0 {
         return Err(Error::Length { path: path.into(), found: bytes.len(), unit, why });
     }
@@ -131,8 +133,8 @@ fn occlusion_file(path: &Path) -> Result<Contents, Error> {
     if !beside.exists() {
         return Ok(Contents::Occlusion(numbers(path, 4, "values are floats of four bytes each")?, None));
     }
-    let text = std::fs::read_to_string(beside).map_err(|cause| Error::Open { path: beside.into(), cause })?;
-    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let text = crate::input::read_text(beside).map_err(|cause| Error::Open { path: beside.into(), cause })?;
+    let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     let damaged = |cause| Error::Occlusion { path: path.into(), cause };
     let sidecar = Sidecar::from_yaml(&text).map_err(damaged)?;
     let values = occlusion::decode(&bytes, sidecar.count).map_err(damaged)?;

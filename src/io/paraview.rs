@@ -1,8 +1,9 @@
 //! ParaView states: a figure of several volumes, ready to open.
 //!
 //! A state is a Python script that ParaView runs on File > Load State, and that `pvbatch` runs to write the picture.
-//! Its logic is the template `paraview/state.py`, the same for every figure; here only the block of constants at its
-//! head is filled in, so that a state is read, and edited, like a small program. It names its volumes relative to its
+//! Its logic is the template `paraview/state.py` with one of two looks, `paraview/surface.py` or `paraview/voxels.py`, the
+//! same for every figure; here only the block of constants at its head is filled in, so that a state is read, and
+//! edited, like a small program. It names its volumes relative to its
 //! own folder, and is pure ASCII: some versions of ParaView decode scripts by the local code page.
 //!
 //! The volumes may be read from `.vti`, or from the headerless `.raw` as in the thesis (Djami, *Ambient Occlusion in
@@ -15,6 +16,12 @@ use crate::volume::Grid;
 
 /// The script, with `@NAME@` where a constant is to stand.
 const TEMPLATE: &str = include_str!("../../paraview/state.py");
+
+/// The template's part for bodies with smooth skins.
+const SURFACE: &str = include_str!("../../paraview/surface.py");
+
+/// The template's part for voxels as boxes.
+const VOXELS: &str = include_str!("../../paraview/voxels.py");
 
 /// What a state shows.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,8 +38,35 @@ pub struct Figure {
     pub cut: Cut,
     /// The picture that is written when the state is run by `pvbatch` or `pvpython`, relative to the state's folder.
     pub screenshot: Option<String>,
-    /// Width and height of the picture in pixels; by default what the panels need, 800 across each.
+    /// Width and height of the picture in pixels; by default what the panels need, 3,200 across all of them with
+    /// [`Style::Surface`], 800 across each with [`Style::Voxels`].
     pub size: Option<[u32; 2]>,
+    /// How volumes are drawn.
+    pub style: Style,
+    /// What gives the colours.
+    pub color_by: ColorBy,
+    /// Whether a colour bar of ambient occlusion stands in the last panel.
+    pub colorbar: bool,
+}
+
+/// How volumes are drawn. Images of one layer are shown pixel by pixel either way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Style {
+    /// Bodies with smooth skins, one an object where the file has an array `object`.
+    #[default]
+    Surface,
+    /// Voxels as boxes, and slices below.
+    Voxels,
+}
+
+/// What gives the colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColorBy {
+    /// The colours of the file.
+    #[default]
+    Rgba,
+    /// A colour map of the file's array `ambient_occlusion`.
+    AmbientOcclusion,
 }
 
 /// One volume of a figure.
@@ -89,7 +123,7 @@ pub enum Axis {
 
 /// The text of a state.
 pub fn state(figure: &Figure) -> String {
-    let mut text = String::with_capacity(TEMPLATE.len() + 200 * figure.panels.len());
+    let mut text = String::with_capacity(TEMPLATE.len() + VOXELS.len() + SURFACE.len() + 200 * figure.panels.len());
     let mut rest = TEMPLATE;
     // One pass, so that an `@SIZE@` in a caption stays what it is.
     while let Some((before, name, after)) = next_placeholder(rest) {
@@ -125,6 +159,15 @@ fn constant(figure: &Figure, name: &str) -> String {
             Cut::Plane { axis, at } => format!("('plane', {}, {})", axis as usize, number(at)),
         },
         "SCREENSHOT" => figure.screenshot.as_deref().map_or("None".into(), quoted),
+        "LOOK" => match figure.style {
+            Style::Surface => SURFACE.into(),
+            Style::Voxels => VOXELS.into(),
+        },
+        "COLOR_BY" => match figure.color_by {
+            ColorBy::Rgba => "'rgba'".into(),
+            ColorBy::AmbientOcclusion => "'ambient_occlusion'".into(),
+        },
+        "COLORBAR" => if figure.colorbar { "True" } else { "False" }.into(),
         "SIZE" => figure.size.map_or("None".into(), |[width, height]| format!("[{width}, {height}]")),
         other => format!("@{other}@"),
     }
@@ -189,6 +232,9 @@ mod tests {
             cut: Cut::None,
             screenshot: Some("figure.png".into()),
             size: None,
+            style: Style::Surface,
+            color_by: ColorBy::Rgba,
+            colorbar: false,
         }
     }
 
@@ -209,12 +255,22 @@ mod tests {
         assert_eq!(line(&text, "CUT"), "CUT = None");
         assert_eq!(line(&text, "SCREENSHOT"), "SCREENSHOT = 'figure.png'");
         assert_eq!(line(&text, "SIZE"), "SIZE = None");
+        assert_eq!(line(&text, "COLOR_BY"), "COLOR_BY = 'rgba'");
+        assert_eq!(line(&text, "COLORBAR"), "COLORBAR = False");
+        // The cut is a clip of ParaView's, and the other look isn't there.
+        assert!(text.contains("Clip(registrationName") && !text.contains("RELIEF"));
 
         figure.source = Source::Raw;
         figure.cut = Cut::Plane { axis: Axis::Z, at: 0.25 };
         figure.screenshot = None;
         figure.size = Some([640, 480]);
+        figure.style = Style::Voxels;
+        figure.color_by = ColorBy::AmbientOcclusion;
+        figure.colorbar = true;
         let text = state(&figure);
+        assert_eq!(line(&text, "COLOR_BY"), "COLOR_BY = 'ambient_occlusion'");
+        assert_eq!(line(&text, "COLORBAR"), "COLORBAR = True");
+        assert!(text.contains("RELIEF") && !text.contains("Clip(registrationName"));
         assert_eq!(line(&text, "SOURCE"), "SOURCE = 'raw'");
         assert_eq!(line(&text, "CUT"), "CUT = ('plane', 2, 0.25)");
         assert_eq!(line(&text, "SCREENSHOT"), "SCREENSHOT = None");
@@ -228,8 +284,10 @@ mod tests {
 
     #[test]
     fn nothing_is_left_to_fill_in() {
-        let text = state(&figure());
-        assert!(!text.contains('@'), "a placeholder without a constant");
+        for style in [Style::Surface, Style::Voxels] {
+            let text = state(&Figure { style, ..figure() });
+            assert!(!text.contains('@'), "a placeholder without a constant");
+        }
     }
 
     #[test]

@@ -2,8 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::{Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation};
+use super::corners::{self, Corners};
+use super::{Crease, Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding};
 use crate::geometry::{Vector, is_degenerate, narrow};
+use crate::progress::{Progress, Silent};
 
 /// Largest magnitude of a coordinate: determinants of four of them, and their squares, stay far from overflow.
 const LARGEST: f64 = 1e30;
@@ -12,23 +14,42 @@ const LARGEST: f64 = 1e30;
 #[derive(Clone, Debug, Default)]
 pub struct MeshBuilder<const D: usize> {
     mesh: Mesh<D>,
-    orientations: Vec<Option<Orientation<D>>>,
-    given_normals: Vec<Option<Vec<Vector<D>>>>,
+    added: Vec<Added<D>>,
+}
+
+/// What there is to know of an object beside its surface.
+#[derive(Clone, Debug)]
+struct Added<const D: usize> {
+    open: Orientation<D>,
+    crease: Crease,
+    normals: Option<Vec<Vector<D>>>,
 }
 
 impl<const D: usize> MeshBuilder<D> {
     /// An empty scene.
     pub fn new() -> Self {
-        Self { mesh: Mesh::default(), orientations: Vec::new(), given_normals: Vec::new() }
+        Self { mesh: Mesh::default(), added: Vec::new() }
     }
 
-    /// Adds an object and rounds it to `f32`.
+    /// Adds an object with one normal a vertex, and rounds it to `f32`.
     pub fn add(
         &mut self,
         name: &str,
         color: [f32; 3],
         surface: &Surface<D>,
         open: Orientation<D>,
+    ) -> Result<(), MeshError> {
+        self.add_creased(name, color, surface, open, Crease::Never)
+    }
+
+    /// Adds an object whose vertices are split at creases, unless it has normals of its own, and rounds it to `f32`.
+    pub fn add_creased(
+        &mut self,
+        name: &str,
+        color: [f32; 3],
+        surface: &Surface<D>,
+        open: Orientation<D>,
+        crease: Crease,
     ) -> Result<(), MeshError> {
         let object = || name.to_owned();
         let (first_vertex, first_simplex) = (self.mesh.vertices.len(), self.mesh.simplices.len());
@@ -58,6 +79,8 @@ impl<const D: usize> MeshBuilder<D> {
         }
         self.mesh.vertices.extend(surface.vertices.iter().map(narrow));
         self.mesh.simplices.extend(surface.simplices.iter().map(|s| s.map(|v| v + first_vertex as u32)));
+        let turned = rounding::turned_over(surface).into_iter().map(|s| s + first_simplex as u32);
+        self.mesh.turned_over.extend(turned);
         self.mesh.objects.push(Object {
             name: object(),
             color,
@@ -66,28 +89,49 @@ impl<const D: usize> MeshBuilder<D> {
             components: 0,
             closed_components: 0,
         });
-        self.orientations.push(Some(open));
-        self.given_normals.push(surface.normals.as_ref().map(|n| n.iter().map(normals::unit).collect()));
+        let normals = surface.normals.as_ref().map(|n| n.iter().map(normals::unit).collect());
+        self.added.push(Added { open, crease, normals });
         Ok(())
     }
 
     /// The finished mesh.
     pub fn finish(self) -> Mesh<D> {
+        self.finish_watched(&Silent).unwrap_or_default()
+    }
+
+    /// The same; `None` soon after `progress` says to stop.
+    pub fn finish_watched(self, progress: &dyn Progress) -> Option<Mesh<D>> {
         let mut mesh = self.mesh;
+        if progress.cancelled() {
+            return None;
+        }
         mesh.identity = identity::identities(&mesh.vertices);
         mesh.normals = vec![Vector::zeros(); mesh.vertices.len()];
         mesh.degenerate =
             (0..mesh.simplices.len() as u32).into_par_iter().filter(|&s| is_degenerate(&mesh.corners(s))).collect();
-        for (i, (open, given)) in self.orientations.into_iter().zip(self.given_normals).enumerate() {
+        let mut splits = Vec::with_capacity(self.added.len());
+        for (i, Added { open, crease, normals: given }) in self.added.into_iter().enumerate() {
             let (vertices, simplices) = (mesh.objects[i].vertices.clone(), mesh.objects[i].simplices.clone());
-            let open = open.unwrap_or(Orientation::Input);
+            if progress.cancelled() {
+                return None;
+            }
             let (components, closed) = orientation::orient(&mut mesh, simplices.clone(), &open);
             (mesh.objects[i].components, mesh.objects[i].closed_components) = (components, closed);
-            normals::set_vertex_normals(&mut mesh, vertices.clone(), simplices);
-            if let Some(given) = given {
-                mesh.normals[vertices].copy_from_slice(&given);
-            }
+            let angle = match (&given, crease) {
+                (Some(_), _) | (None, Crease::Never) => None,
+                (None, Crease::Above(degrees)) => Some(degrees),
+                (None, Crease::Rough) => Some(corners::rough_angle(&mesh, simplices.clone())),
+            };
+            splits.push(match angle {
+                Some(degrees) => corners::split(&mesh, vertices, simplices, degrees),
+                None => {
+                    normals::set_vertex_normals(&mut mesh, vertices.clone(), simplices);
+                    let own = given.unwrap_or_else(|| mesh.normals[vertices].to_vec());
+                    Corners { sources: Vec::new(), normals: own, moved: Vec::new() }
+                }
+            });
         }
-        mesh
+        corners::add(&mut mesh, splits);
+        Some(mesh)
     }
 }

@@ -9,16 +9,24 @@
 //!   normals within one;
 //! - [`orientation`]: which components are closed, and which side of them is outside;
 //! - [`normals`]: measure-weighted vertex normals;
+//! - [`rounding`]: which simplices turn over when rounded;
+//! - [`corners`]: where the surface creases, and vertices are split so that each side has a normal of its own;
 //! - simplices of measure zero, which no ray can hit.
 
+mod approach;
 mod build;
+pub mod corners;
 mod error;
+pub mod facets;
 pub mod identity;
 mod incidence;
+mod nesting;
 pub mod normals;
 pub mod orientation;
+pub mod rounding;
 mod surface;
 pub mod topology;
+mod union_find;
 pub mod weld;
 
 use std::ops::Range;
@@ -27,11 +35,14 @@ use sha2::{Digest, Sha256};
 
 use crate::geometry::{Aabb, Vector};
 
+pub use approach::approach;
 pub use build::MeshBuilder;
+pub use corners::Crease;
 pub use error::MeshError;
 pub use incidence::Incidence;
 pub use orientation::{Orientation, Viewpoint};
 pub use surface::Surface;
+pub use union_find::UnionFind;
 
 /// One object of a scene: which vertices and simplices of the mesh are its own, and how it looks.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +81,8 @@ pub struct Mesh<const D: usize> {
     pub simplices: Vec<[u32; D]>,
     /// The simplices of measure zero, ascending. They are kept, but nothing hits them.
     pub degenerate: Vec<u32>,
+    /// The simplices that rounding to `f32` turned over or made flat, ascending.
+    pub turned_over: Vec<u32>,
     /// The objects, in order; their ranges cover all vertices and all simplices.
     pub objects: Vec<Object>,
 }

@@ -7,8 +7,9 @@
 
 use std::ops::Range;
 
-use super::Mesh;
-use crate::geometry::{Aabb, Cone, Vector, Vector64, determinant, plane_side, widen};
+use super::facets::{has_double, sorted_facets};
+use super::{Mesh, nesting};
+use crate::geometry::{Vector, Vector64, determinant, plane_side, widen};
 
 /// How the open components of an object are oriented.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,48 +29,6 @@ pub enum Viewpoint<const D: usize> {
     Direction(Vector<D>),
 }
 
-/// A facet seen from one of its simplices: the identities of its corners sorted, and how that sort and the place of
-/// the opposite corner orient it.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Facet {
-    corners: [u32; 3],
-    simplex: u32,
-    even: bool,
-}
-
-/// The facets of the simplices, sorted, so that the simplices around a facet stand together. Simplices with two equal
-/// corners are left out: they have no facet that isn't doubled or degenerate itself.
-fn sorted_facets<const D: usize>(corners: &[[u32; D]]) -> Vec<Facet> {
-    let mut facets = Vec::with_capacity(corners.len() * D);
-    for (s, simplex) in corners.iter().enumerate() {
-        if (0..D).any(|i| simplex[i + 1..].contains(&simplex[i])) {
-            continue;
-        }
-        for opposite in 0..D {
-            let mut key = [u32::MAX; 3];
-            let mut n = 0;
-            for (i, &corner) in simplex.iter().enumerate() {
-                if i != opposite {
-                    key[n] = corner;
-                    n += 1;
-                }
-            }
-            let mut even = opposite % 2 == 0;
-            for i in 1..n {
-                let mut j = i;
-                while j > 0 && key[j - 1] > key[j] {
-                    key.swap(j - 1, j);
-                    even = !even;
-                    j -= 1;
-                }
-            }
-            facets.push(Facet { corners: key, simplex: s as u32, even });
-        }
-    }
-    facets.sort_unstable();
-    facets
-}
-
 /// A set of simplices connected through facets.
 struct Component {
     simplices: Vec<u32>,
@@ -79,14 +38,16 @@ struct Component {
 /// Splits the simplices into components, and finds for each simplex whether it must be turned to agree with the first
 /// of its component.
 fn components<const D: usize>(corners: &[[u32; D]]) -> (Vec<Component>, Vec<bool>) {
-    let facets = sorted_facets(corners);
+    let mut facets = sorted_facets(corners);
+    // A simplex with two equal corners has no facet that isn't doubled or degenerate itself.
+    facets.retain(|facet| !has_double(&corners[facet.simplex as usize]));
     let mut neighbours: Vec<[Option<(u32, bool)>; D]> = vec![[None; D]; corners.len()];
     let mut open = vec![false; corners.len()];
     for around in facets.chunk_by(|a, b| a.corners == b.corners) {
         if let [a, b] = around {
             for (one, other) in [(a, b), (b, a)] {
                 let free = neighbours[one.simplex as usize].iter_mut().find(|n| n.is_none());
-                *free.expect("a simplex has D facets") = Some((other.simplex, a.even == b.even));
+                *free.expect("a simplex has D facets") = Some((other.simplex, a.turned == b.turned));
             }
         } else {
             around.iter().for_each(|f| open[f.simplex as usize] = true);
@@ -130,8 +91,10 @@ pub fn orient<const D: usize>(mesh: &mut Mesh<D>, simplices: Range<usize>, open:
     let (components, turned) = components(&corners);
     let wide = |s: u32| corners[s as usize].map(|v| widen(&mesh.vertices[v as usize]));
     let closed: Vec<&Component> = components.iter().filter(|c| c.closed).collect();
+    let points: Vec<[Vector<D>; D]> = corners.iter().map(|s| s.map(|v| mesh.vertices[v as usize])).collect();
+    let depths = nesting::depths(&points, &closed.iter().map(|c| &c.simplices[..]).collect::<Vec<_>>());
     let mut flip = vec![false; corners.len()];
-    for (i, component) in closed.iter().enumerate() {
+    for (component, depth) in closed.iter().zip(depths) {
         // D! times the enclosed measure, by the divergence theorem, about a corner of the component.
         let origin = wide(component.simplices[0])[0];
         let volume: f64 = (component.simplices.iter())
@@ -142,17 +105,15 @@ pub fn orient<const D: usize>(mesh: &mut Mesh<D>, simplices: Range<usize>, open:
             .sum();
         // det[v_i - p] is minus the height of p above the simplex: positive if the normal points away from p.
         let inward = volume < 0.0;
-        let others: Vec<&Component> = (closed.iter().enumerate()).filter(|(j, _)| *j != i).map(|(_, c)| *c).collect();
-        let cavity = nesting_depth(mesh, &corners, component, &others) % 2 == 1;
+        let cavity = depth % 2 == 1;
         for &s in &component.simplices {
             flip[s as usize] = turned[s as usize] ^ inward ^ cavity;
         }
     }
     if let Orientation::Facing(viewpoint) = open {
         for &s in components.iter().filter(|c| !c.closed).flat_map(|c| &c.simplices) {
-            let points = corners[s as usize].map(|v| mesh.vertices[v as usize]);
             flip[s as usize] = match viewpoint {
-                Viewpoint::Eye(eye) => plane_side(&points, eye) < 0,
+                Viewpoint::Eye(eye) => plane_side(&points[s as usize], eye) < 0,
                 Viewpoint::Direction(d) => crate::geometry::normal_of(&wide(s)).dot(&widen(d)) < 0.0,
             };
         }
@@ -162,33 +123,4 @@ pub fn orient<const D: usize>(mesh: &mut Mesh<D>, simplices: Range<usize>, open:
         simplex.swap(D - 2, D - 1);
     }
     counts
-}
-
-/// How many of the other closed components hold this one.
-fn nesting_depth<const D: usize>(
-    mesh: &Mesh<D>,
-    corners: &[[u32; D]],
-    inner: &Component,
-    others: &[&Component],
-) -> usize {
-    let points = |s: u32| corners[s as usize].map(|v| mesh.vertices[v as usize]);
-    let bounds = |c: &Component| Aabb::of(c.simplices.iter().flat_map(|&s| points(s)).collect::<Vec<_>>().iter());
-    if others.is_empty() {
-        return 0;
-    }
-    let inner_bounds = bounds(inner);
-    let holds = |outer: &Component| {
-        // Directions until one meets no facet; a corner that lies on the other component itself is passed over.
-        let mut candidates = inner.simplices.iter().take(8).flat_map(|&s| points(s));
-        candidates.find_map(|p| {
-            (1..32u32).find_map(|k| {
-                let direction = Vector::<D>::from_fn(|r, _| ((k * 37 + r as u32 * 101) % 64) as f32 - 31.37);
-                (outer.simplices.iter()).try_fold(false, |inside, &s| {
-                    let cone = Cone::of_simplex(&p, &points(s));
-                    cone.strictly_contains(&direction).map(|hit| inside ^ hit)
-                })
-            })
-        })
-    };
-    others.iter().filter(|o| bounds(o).contains(&inner_bounds)).filter(|o| holds(o) == Some(true)).count()
 }

@@ -1,8 +1,7 @@
 //! How the simplices of a surface hang together, and what they enclose.
 //!
 //! A surface is *closed* when its boundary, as a sum of oriented facets, is zero: every facet of a simplex is met by
-//! one of another simplex with the opposite orientation. Facets are compared as sorted vertex indices; the parity of
-//! the sort, and of the place of the vertex left out, is the orientation. A closed surface divides space, and by the
+//! one of another simplex with the opposite orientation. A closed surface divides space, and by the
 //! divergence theorem its simplices add up to the volume inside:
 //!
 //! ```text
@@ -13,7 +12,9 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::{Vector64, determinant, measure};
+use super::facets::{facets_of, has_double, sorted_facets};
+use super::union_find::UnionFind;
+use crate::geometry::{Dimension, Vector64, determinant, measure};
 
 /// How the facets of a surface are shared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,43 +45,11 @@ impl FacetPairs {
     }
 }
 
-/// Sorts the entries, and tells whether that took an odd number of exchanges.
-pub fn sort_with_parity<T: Ord>(entries: &mut [T]) -> bool {
-    let mut odd = false;
-    for i in 1..entries.len() {
-        let mut j = i;
-        while j > 0 && entries[j - 1] > entries[j] {
-            entries.swap(j - 1, j);
-            odd = !odd;
-            j -= 1;
-        }
-    }
-    odd
-}
-
-/// The facets of a simplex as sorted indices and whether they run against the sorted order. Facets that name a vertex
-/// twice are left out: the simplices that have them have no measure, and their other facets cancel.
-fn facets_of<const D: usize>(simplex: &[u32; D]) -> impl Iterator<Item = ([u32; 3], bool)> + '_ {
-    (0..D).filter_map(|left_out| {
-        let mut facet = [u32::MAX; 3];
-        for (slot, &vertex) in
-            facet.iter_mut().zip(simplex.iter().enumerate().filter(|(i, _)| *i != left_out).map(|(_, v)| v))
-        {
-            *slot = vertex;
-        }
-        let odd = sort_with_parity(&mut facet[..D - 1]);
-        let distinct = facet[..D - 1].windows(2).all(|pair| pair[0] < pair[1]);
-        distinct.then_some((facet, odd != (left_out % 2 == 1)))
-    })
-}
-
 /// How the facets of these simplices are shared. Vertices are told apart by index: weld first what should count as one.
 pub fn facet_pairs<const D: usize>(simplices: &[[u32; D]]) -> FacetPairs {
-    let mut facets: Vec<([u32; 3], bool)> = simplices.iter().flat_map(facets_of).collect();
-    facets.sort_unstable();
     let mut pairs = FacetPairs::default();
-    for shared in facets.chunk_by(|a, b| a.0 == b.0) {
-        let turned = shared.iter().filter(|(_, turned)| *turned).count();
+    for shared in sorted_facets(simplices).chunk_by(|a, b| a.corners == b.corners) {
+        let turned = shared.iter().filter(|facet| facet.turned).count();
         pairs.facets += 1;
         pairs.unbalanced += usize::from(2 * turned != shared.len());
         match (shared.len(), turned) {
@@ -114,8 +83,12 @@ pub fn f_vector<const D: usize>(simplices: &[[u32; D]]) -> Vec<usize> {
         distinct(simplices.as_flattened().to_vec()),
         distinct(simplices.iter().flat_map(edges).filter(|(a, b)| a < b).collect()),
     ];
-    if D == 4 {
-        counts.push(distinct(simplices.iter().flat_map(facets_of).map(|(facet, _)| facet).collect()));
+    match Dimension::of::<D>() {
+        // The facets of triangles are the edges.
+        Dimension::Three => {}
+        Dimension::Four => {
+            counts.push(distinct(simplices.iter().flat_map(facets_of).map(|(facet, _)| facet).collect()))
+        }
     }
     counts.push(simplices.len());
     counts
@@ -123,28 +96,11 @@ pub fn f_vector<const D: usize>(simplices: &[[u32; D]]) -> Vec<usize> {
 
 /// How many pieces there are that no facet connects. Bodies that touch along a facet are one piece here.
 pub fn components<const D: usize>(simplices: &[[u32; D]]) -> usize {
-    let mut facets: Vec<([u32; 3], u32)> = (simplices.iter().enumerate())
-        .flat_map(|(s, simplex)| facets_of(simplex).map(move |(facet, _)| (facet, s as u32)))
-        .collect();
-    facets.sort_unstable();
-    // A forest in which each tree is a piece; looking for its root halves the way for whoever comes after.
-    let mut parents: Vec<u32> = (0..simplices.len() as u32).collect();
-    let root = |parents: &mut [u32], mut s: u32| {
-        while parents[s as usize] != s {
-            parents[s as usize] = parents[parents[s as usize] as usize];
-            s = parents[s as usize];
-        }
-        s
-    };
-    let mut pieces = simplices.len();
-    for pair in facets.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        let (a, b) = (root(&mut parents, pair[0].1), root(&mut parents, pair[1].1));
-        if a != b {
-            parents[a.max(b) as usize] = a.min(b);
-            pieces -= 1;
-        }
+    let mut pieces = UnionFind::new(simplices.len());
+    for pair in sorted_facets(simplices).windows(2).filter(|pair| pair[0].corners == pair[1].corners) {
+        pieces.join(pair[0].simplex, pair[1].simplex);
     }
-    pieces
+    pieces.sets()
 }
 
 /// How many vertices there are where the surface touches itself: whose simplices, cut off around the vertex, make up
@@ -169,7 +125,7 @@ fn is_regular<const D: usize>(star: &[(u32, u32)], simplices: &[[u32; D]]) -> bo
     for &(vertex, s) in star {
         let mut simplex = simplices[s as usize];
         simplex.sort_unstable();
-        if simplex.windows(2).any(|pair| pair[0] == pair[1]) {
+        if has_double(&simplex) {
             continue;
         }
         // The vertex goes to the end, where it is out of the way; the others stay sorted.
@@ -194,33 +150,24 @@ fn is_regular<const D: usize>(star: &[(u32, u32)], simplices: &[[u32; D]]) -> bo
     vertices.sort_unstable();
     vertices.dedup();
     ridges.sort_unstable();
-    let mut parents: Vec<u32> = (0..link.len() as u32).collect();
-    let root = |parents: &[u32], mut i: u32| {
-        while parents[i as usize] != i {
-            i = parents[i as usize];
-        }
-        i
-    };
-    let (mut pieces, mut distinct, mut open) = (link.len(), 0, 0);
+    let mut pieces = UnionFind::new(link.len());
+    let (mut distinct, mut open) = (0, 0);
     for shared in ridges.chunk_by(|a, b| a.0 == b.0) {
         distinct += 1;
         match shared {
             [_] => open += 1,
-            [a, b] => {
-                let (a, b) = (root(&parents, a.1), root(&parents, b.1));
-                if a != b {
-                    parents[a.max(b) as usize] = a.min(b);
-                    pieces -= 1;
-                }
-            }
+            [a, b] => pieces.join(a.1, b.1),
             _ => return false,
         }
     }
-    let euler = match D {
-        3 => return pieces == 1,
-        _ => vertices.len() as i64 - distinct as i64 + link.len() as i64,
-    };
-    pieces == 1 && euler == if open == 0 { 2 } else { 1 }
+    pieces.sets() == 1
+        && match Dimension::of::<D>() {
+            Dimension::Three => true,
+            Dimension::Four => {
+                let euler = vertices.len() as i64 - distinct as i64 + link.len() as i64;
+                euler == if open == 0 { 2 } else { 1 }
+            }
+        }
 }
 
 /// The corners of each simplex. Indices must be within `vertices`.
@@ -252,7 +199,10 @@ pub fn quality<const D: usize>(simplex: &[Vector64<D>; D]) -> f64 {
     let squares: f64 =
         (0..D).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| (simplex[i] - simplex[j]).norm_squared()).sum();
     let volume = measure(simplex);
-    let numerator = if D == 3 { 48f64.sqrt() * volume } else { 12.0 * (3.0 * volume).powf(2.0 / 3.0) };
+    let numerator = match Dimension::of::<D>() {
+        Dimension::Three => 48f64.sqrt() * volume,
+        Dimension::Four => 12.0 * (3.0 * volume).powf(2.0 / 3.0),
+    };
     if squares > 0.0 { numerator / squares } else { 0.0 }
 }
 
@@ -285,7 +235,7 @@ mod tests {
         let pairs = facet_pairs(&simplices);
         assert_eq!(pairs.facets, D * (D + 1) / 2);
         assert!(pairs.is_closed() && pairs.is_manifold());
-        let factorial = if D == 3 { 6.0 } else { 24.0 };
+        let factorial = Dimension::of::<D>().pick(6.0, 24.0);
         let volume = enclosed_volume(corners(&vertices, &simplices));
         assert!((volume - 1.0 / factorial).abs() < 1e-15, "{volume}");
         let moved: Vec<_> = vertices.iter().map(|v| v + Vector64::from_element(1e6)).collect();

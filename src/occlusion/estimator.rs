@@ -6,17 +6,18 @@
 //!   by the scene alone, never by a ray, so the values have no bias. Where few simplices are to be seen there is the most
 //!   to gain, as their silhouettes are long for what they cover, and points sent elsewhere say little about them;
 //! - the algorithm as it was published ([`Estimator::AsPublished`]), whose errors are those of its rays, not of its
-//!   deviations.
+//!   deviations;
+//! - the program as it was written ([`Estimator::AsProgrammed`]), for comparison.
 //!
 //! A new method is one more variant here, and one more arm in [`Estimator::estimate`].
 
 use rayon::prelude::*;
 
-use super::as_published::{AsPublished, Deviations};
+use super::as_published::{AsProgrammed, AsPublished, Deviations, ProgramDeviations};
 use super::error::Error;
 use super::exact::{self, Budget};
 use crate::accel::Tracer;
-use crate::progress::Progress;
+use crate::progress::{Cancelled, Progress};
 use crate::trace::{Estimate, RayBackend, Sampling, ShadingPoint};
 
 /// A view is simple if at most so many simplices rise above the horizon,
@@ -40,6 +41,8 @@ pub enum Estimator {
     /// The thesis's algorithm with these deviations from the truth, by random rays; the target isn't asked. The thesis has
     /// no values inside simplices; there plain rays stand in for its own.
     AsPublished(Sampling, Deviations),
+    /// The thesis's program as it was written, with these deviations, by `samples` rays.
+    AsProgrammed(Sampling, ProgramDeviations),
 }
 
 /// Values at points, in their order.
@@ -95,7 +98,14 @@ impl Estimator {
             Self::Adaptive(sampling) => adaptive(backend, &asked, &sampling, progress)?,
             Self::Exact(budget) => in_closed_form(backend.tracer(), &asked, budget, progress)
                 .map_err(|error| error.numbered(|place| order[place]))?,
-            Self::AsPublished(sampling, deviations) => published(backend, &asked, &sampling, deviations, progress)?,
+            Self::AsPublished(sampling, deviations) => {
+                let published = AsPublished::new(backend.tracer(), deviations);
+                of_the_thesis(backend, &asked, &sampling, progress, |v| published.at_vertex(v, &sampling, progress))?
+            }
+            Self::AsProgrammed(sampling, deviations) => {
+                let programmed = AsProgrammed::new(backend.tracer(), deviations);
+                of_the_thesis(backend, &asked, &sampling, progress, |v| programmed.at_vertex(v, &sampling, progress))?
+            }
         };
         let count = points.len();
         let mut estimates = Estimates { values: vec![1.0; count], errors: vec![f32::NAN; count], rays: 0 };
@@ -179,22 +189,21 @@ fn name<const D: usize>(point: &ShadingPoint<D>) -> String {
     }
 }
 
-/// The published algorithm at vertices, plain rays inside simplices.
-fn published<const D: usize>(
+/// What the thesis has at vertices, plain rays inside simplices.
+fn of_the_thesis<const D: usize>(
     backend: &dyn RayBackend<D>,
     points: &[ShadingPoint<D>],
     sampling: &Sampling,
-    deviations: Deviations,
     progress: &dyn Progress,
+    at_vertex: impl Fn(u32) -> Result<f32, Cancelled> + Sync,
 ) -> Result<Vec<Estimate>, Error> {
     let is_vertex = |point: &ShadingPoint<D>| matches!(point, ShadingPoint::Vertex(_));
     let inside: Vec<ShadingPoint<D>> = points.iter().filter(|point| !is_vertex(point)).copied().collect();
     let inside = backend.open_fractions(&inside, &Sampling { target: None, ..*sampling }, progress)?;
-    let published = AsPublished::new(backend.tracer(), deviations);
     let value = |point: &ShadingPoint<D>| match *point {
         ShadingPoint::Inside { .. } => Ok(None),
         ShadingPoint::Vertex(vertex) => {
-            let value = published.at_vertex(vertex, sampling, progress)?;
+            let value = at_vertex(vertex)?;
             progress.advance(1);
             Ok(Some(Estimate::independent(value, sampling.samples)))
         }

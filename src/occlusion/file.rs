@@ -3,11 +3,11 @@
 
 use std::fmt::Write;
 
-use serde::Serialize;
-use thiserror::Error;
+use serde::{Deserialize, Serialize};
+use serde_saphyr::Error;
 
 /// What stands beside an occlusion file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Sidecar {
     /// Values in the file.
     pub count: usize,
@@ -22,6 +22,7 @@ pub struct Sidecar {
     /// The pipeline's seed.
     pub seed: u64,
     /// Distance beyond which hits don't count; infinite if all do.
+    #[serde(default = "infinite")]
     pub max_distance: f32,
     /// Root mean square over the vertices of the standard error of each value.
     pub error_estimate: f64,
@@ -32,15 +33,17 @@ pub struct Sidecar {
 }
 
 /// Why an occlusion file isn't one, or not that of this mesh.
-#[derive(Clone, Debug, Error, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)]
 pub enum FileError {
     #[error("it holds {found} bytes, but {count} values take {expected}; it is truncated, or belongs to another scene")]
     Length { found: usize, expected: usize, count: usize },
     #[error("value {index} is {value}; an ambient occlusion lies between 0 and 1")]
     Value { index: usize, value: f32 },
-    #[error("its sidecar lacks `{0}`, or what it says there can't be read")]
+    #[error("its sidecar lacks `{0}`")]
     Sidecar(&'static str),
+    #[error("its sidecar can't be read: {0}")]
+    SidecarText(String),
     #[error(
         "it was computed for another mesh ({found} instead of {expected}); compute it again, or load it into the scene it belongs to"
     )]
@@ -68,7 +71,7 @@ pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<f32>, FileError> {
 }
 
 impl Sidecar {
-    /// As YAML.
+    /// As YAML: some lines of `key: value`, with as many digits as mean something.
     pub fn to_yaml(&self) -> String {
         let mut text = String::from("# What the values in the file of this name are.\n");
         let mut line = |key: &str, value: &dyn std::fmt::Display| {
@@ -98,26 +101,11 @@ impl Sidecar {
     /// Reads what [`Self::to_yaml`] writes.
     ///
     /// # Errors
-    /// [`FileError::Sidecar`] names the first thing that is missing.
+    /// If a key is missing, or the text is no YAML of this kind.
     pub fn from_yaml(text: &str) -> Result<Self, FileError> {
-        let field = |key: &'static str| {
-            let value = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(':').map(str::trim));
-            value.filter(|v| !v.is_empty()).ok_or(FileError::Sidecar(key))
-        };
-        fn number<T: std::str::FromStr>(key: &'static str, value: &str) -> Result<T, FileError> {
-            value.parse().map_err(|_| FileError::Sidecar(key))
-        }
-        Ok(Self {
-            count: number("count", field("count")?)?,
-            method: field("method")?.to_owned(),
-            samples: field("samples").ok().map(|v| number("samples", v)).transpose()?,
-            target_error: field("target_error").ok().map(|v| number("target_error", v)).transpose()?,
-            mean_samples: field("mean_samples").ok().map(|v| number("mean_samples", v)).transpose()?,
-            seed: number("seed", field("seed")?)?,
-            max_distance: field("max_distance").map_or(Ok(f32::INFINITY), |v| number("max_distance", v))?,
-            error_estimate: number("error_estimate", field("error_estimate")?)?,
-            mesh: field("mesh")?.to_owned(),
-            program: field("program")?.to_owned(),
+        serde_saphyr::from_str(text).map_err(|error| match error.without_snippet() {
+            Error::SerdeMissingField { field, .. } => FileError::Sidecar(field),
+            other => FileError::SidecarText(other.to_string()),
         })
     }
 
@@ -128,6 +116,10 @@ impl Sidecar {
         }
         Ok(())
     }
+}
+
+fn infinite() -> f32 {
+    f32::INFINITY
 }
 
 fn short(hash: &str) -> String {
@@ -165,6 +157,18 @@ mod tests {
         for key in ["count", "method", "seed", "error_estimate", "mesh", "program"] {
             let without: String = text.lines().filter(|l| !l.starts_with(key)).map(|l| format!("{l}\n")).collect();
             assert_eq!(Sidecar::from_yaml(&without), Err(FileError::Sidecar(key)));
+        }
+        // A hash that looks like a number is text all the same.
+        for mesh in ["1".repeat(64), "12e5".into(), "0x1f".into()] {
+            assert_eq!(Sidecar::from_yaml(&text.replace("00ff", &mesh)).unwrap().mesh, mesh);
+        }
+        for (wrong, line) in [(text.replace("count: 8", "count: -8"), 2), (text.replace("seed: ", "seed: [") + "]", 7)]
+        {
+            let error = Sidecar::from_yaml(&wrong).unwrap_err().to_string();
+            assert!(
+                error.starts_with("its sidecar can't be read: ") && error.contains(&format!("line {line}")),
+                "{error}"
+            );
         }
         assert!(sidecar.check("00ff", 8).is_ok());
         assert!(sidecar.check("00fe", 8).is_err());

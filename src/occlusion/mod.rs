@@ -23,7 +23,7 @@ pub mod exact;
 mod file;
 
 pub use crate::progress::Cancelled;
-pub use as_published::{AsPublished, Deviations, plain_cramer};
+pub use as_published::{AsProgrammed, AsPublished, Deviations, ProgramDeviations, plain_cramer};
 pub use error::Error;
 pub use estimator::{Estimates, Estimator};
 pub use file::{FileError, Sidecar, decode, encode};

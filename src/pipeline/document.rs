@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use super::error::{Error, Invalid, Place, Refusal};
+use super::error::{Error, Place, Refusal};
 use super::overrides;
 use super::yaml::{self, Node, Origin, Problem, Segment, Value};
+use crate::stages::Invalid;
 
 /// Larger files are refused. A scene of that size belongs into a mesh file.
 const MAX_BYTES: u64 = 64 << 20;
@@ -16,6 +17,7 @@ const MAX_BYTES: u64 = 64 << 20;
 #[derive(Clone, Debug)]
 pub struct Document {
     file: String,
+    folder: PathBuf,
     root: Node,
     sets: Vec<String>,
 }
@@ -24,14 +26,19 @@ impl Document {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let mut bytes = Vec::new();
-        let read = std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
+        let read = crate::input::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
         read.map_err(|source| Error::Read { path: path.to_owned(), source })?;
         let not_text = |message: String| Error::NotText { path: path.to_owned(), message };
         if bytes.len() as u64 > MAX_BYTES {
             return Err(not_text(format!("is larger than {} MB; keep meshes in files of their own", MAX_BYTES >> 20)));
         }
         match String::from_utf8(bytes) {
-            Ok(text) => Self::parse(&path.display().to_string(), &text),
+            Ok(text) => {
+                // A folder whose name is not UTF-8 can be shown only roughly, but must be found.
+                let mut document = Self::parse(&path.display().to_string(), &text)?;
+                document.folder = parent(path);
+                Ok(document)
+            }
             Err(e) => {
                 let at = e.utf8_error().valid_up_to();
                 Err(not_text(format!(
@@ -44,8 +51,13 @@ impl Document {
     /// Reads a text; `file` is what messages call it.
     pub fn parse(file: &str, text: &str) -> Result<Self, Error> {
         let blank = Node { origin: Origin::File { line: 1, column: 1 }, value: Value::Null };
-        let mut document = Document { file: file.to_owned(), root: blank, sets: Vec::new() };
+        let mut document =
+            Document { file: file.to_owned(), folder: parent(Path::new(file)), root: blank, sets: Vec::new() };
         document.root = yaml::parse(text).map_err(|p| document.error(p))?;
+        if matches!(document.root.value, Value::Null) {
+            let problem = Problem::new("is empty; a pipeline is a mapping with `name` and `stages`");
+            return Err(document.error(problem.or_at(Origin::File { line: 1, column: 1 })));
+        }
         Ok(document)
     }
 
@@ -84,7 +96,7 @@ impl Document {
 
     /// The folder that relative paths in the pipeline start from.
     pub fn folder(&self) -> PathBuf {
-        Path::new(&self.file).parent().map(Path::to_owned).unwrap_or_default()
+        self.folder.clone()
     }
 
     /// Where the value at a path is, or the nearest part of it that is written; and the path as messages write it.
@@ -119,6 +131,10 @@ impl Document {
         let place = self.place(problem.origin.unwrap_or(self.root.origin));
         Error::Refused(Box::new(Refusal { place, path: problem.path(), message: problem.to_string() }))
     }
+}
+
+fn parent(file: &Path) -> PathBuf {
+    file.parent().map(Path::to_owned).unwrap_or_default()
 }
 
 #[cfg(test)]

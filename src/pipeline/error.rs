@@ -48,6 +48,9 @@ impl fmt::Display for Refusal {
     }
 }
 
+/// Characters of an override that a message quotes.
+const LONGEST_QUOTE: usize = 200;
+
 /// Where a value was written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
@@ -68,26 +71,10 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Place::File { file, line, column } => write!(f, "{file}:{line}:{column}"),
-            Place::Set(assignment) => write!(f, "--set {assignment}"),
+            Place::Set(assignment) => match assignment.char_indices().nth(LONGEST_QUOTE) {
+                Some((end, _)) => write!(f, "--set {}...", &assignment[..end]),
+                None => write!(f, "--set {assignment}"),
+            },
         }
-    }
-}
-
-/// A complaint about the value at a path, raised by a check that knows no lines.
-///
-/// [`Document::refuse`](super::Document::refuse) finds the line.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{path}: {message}")]
-pub struct Invalid {
-    /// The dotted path, such as `stages[1].render.dimensions[0]`.
-    pub path: String,
-    /// What is wrong, what was expected, what to do.
-    pub message: String,
-}
-
-impl Invalid {
-    /// About the value at `path`.
-    pub fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
-        Invalid { path: path.into(), message: message.into() }
     }
 }

@@ -1,7 +1,7 @@
 //! From YAML to work: what a user wrote is read, checked and resolved before anything runs.
 //!
 //! Two types stand for the two halves. [`spec`] is the pipeline as written: keys and values, nothing looked up.
-//! [`plan`] is the pipeline as understood: every stage knows by index what it works on, every default is filled in,
+//! [`Plan`] is the pipeline as understood: every stage knows by index what it works on, every default is filled in,
 //! every range checked, every file named once. The way from one to the other refuses whatever can be refused without
 //! running, with file, line and the nearest right word, so that `ao4d check` and `ao4d run` refuse the same things.
 //!
@@ -10,38 +10,30 @@
 //!                  \________________ lines _________________/
 //! ```
 
-mod build;
+mod book;
 mod cache;
-mod cut;
 mod document;
 mod error;
-mod figure;
-mod files;
-mod limits;
-mod occlude;
-mod one_or_many;
+mod guard;
+mod lock;
 pub mod overrides;
-pub mod plan;
-mod prepare;
+mod pool;
 mod report;
 mod run;
 mod schema;
 mod settings;
 pub mod spec;
 mod study;
-mod suggest;
-mod work;
 mod yaml;
 
 use std::path::{Path, PathBuf};
 
-pub use build::{AnyMesh, camera};
-pub use cut::{Axis, Cut, Plane};
+use crate::progress::{Progress, Silent};
+use crate::stages::prepare::Prepared;
+use crate::stages::{Plan, suggest};
+
 pub use document::Document;
-pub use error::{Error, Invalid, Place, Refusal};
-pub use one_or_many::OneOrMany;
-pub use plan::Plan;
-pub use prepare::{Loaded, Prepared};
+pub use error::{Error, Place, Refusal};
 pub use report::{FileReport, Report, StageTime};
 pub use run::{RunError, run};
 pub use schema::schema;
@@ -70,8 +62,28 @@ impl Pipeline {
             document.set(assignment)?;
         }
         let spec: spec::PipelineSpec = document.decode()?;
-        let plan = Plan::new(&spec, document.folder(), out).map_err(|invalid| document.refuse(invalid))?;
+        let (seed, folder) = (spec.seed.unwrap_or(0), document.folder());
+        let plan = Plan::new(&spec.name, seed, &spec.stages, folder, out);
+        let plan = plan.map_err(|invalid| document.refuse(invalid))?;
         Ok(Pipeline { plan, document })
+    }
+
+    /// Builds the scenes for which `wanted` says so, and reads the occlusion files that are loaded into them and wanted
+    /// too; both by their places in the plan.
+    ///
+    /// # Errors
+    /// Whatever is wrong with an object or a file, with the line that asked for it.
+    pub fn prepare(&self, wanted: impl Fn(usize) -> bool) -> Result<Prepared, Error> {
+        self.prepare_watched(wanted, &Silent)
+    }
+
+    /// The same, and ends soon after `progress` says to stop; what it returns then is of no use.
+    ///
+    /// # Errors
+    /// As [`Pipeline::prepare`].
+    pub fn prepare_watched(&self, wanted: impl Fn(usize) -> bool, progress: &dyn Progress) -> Result<Prepared, Error> {
+        guard::check(self)?;
+        self.plan.prepare(wanted, progress).map_err(|invalid| self.document.refuse(invalid))
     }
 
     /// What is allowed but probably not meant, each with its place.

@@ -13,11 +13,10 @@
 
 use super::suggest;
 use super::yaml::{self, Entry, Node, Origin, Problem, Segment, Value, shorten};
+use crate::stages::KINDS;
 
 /// The pipeline's own keys.
 pub(super) const TOP_KEYS: [&str; 3] = ["name", "seed", "stages"];
-/// The kinds of stage, as the pipeline's text names them.
-pub(super) const KINDS: [&str; 5] = ["scene", "occlusion", "render", "write", "paraview"];
 
 /// Applies one assignment to the tree. A refusal without a place is about the assignment itself.
 pub(super) fn apply(root: &mut Node, assignment: &str, origin: Origin) -> Result<(), Problem> {
@@ -189,7 +188,7 @@ stages:
             ("ao=3", "`ao` is a stage; name one of its keys: ao.KEY=3"),
             ("render.dimensions[3]=7", "dimensions: the list has 3 items, so [3] is outside it"),
             ("ao.samples.x=7", "samples: is the number 4, so it has no key `x`"),
-            ("ao.samples=[1", "the value is not YAML: while parsing a flow sequence, expected ',' or ']'"),
+            ("ao.samples=[1", "the value is not YAML: unclosed bracket '['"),
             ("stages[9].render.shading=flat", "stages: the list has 3 items, so [9] is outside it"),
         ] {
             assert_eq!(after(&[assignment]).unwrap_err(), format!("--set {assignment}: {message}"));

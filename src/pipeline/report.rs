@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::plan::size;
+use crate::stages::describe::size;
 
 /// A finished run.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -17,8 +17,17 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::pipeline::spec::*;
-    use crate::pipeline::{Axis, Plane, yaml};
+    use crate::pipeline::yaml;
+    use crate::render::Aov;
+    use crate::scene::ObjectSpec;
+    use crate::stages::StageSpec;
+    use crate::stages::camera::{CameraSpec, Projection};
+    use crate::stages::cut::{Axis, Plane};
+    use crate::stages::occlusion::{Method, OcclusionSpec};
+    use crate::stages::paraview::{ColorBy, ParaviewSpec, Reader, Style};
+    use crate::stages::render::{RenderSpec, Shading};
+    use crate::stages::scene::SceneSpec;
+    use crate::stages::write::{Compression, Encoding, WriteSpec};
 
     /// The words that the decoder proposes where it meets one that nobody would use.
     fn decoder_knows<T: DeserializeOwned>(text: &str) -> BTreeSet<String> {
@@ -66,10 +75,14 @@ mod tests {
             ("Method", decoder_knows::<Method>("zzz")),
             ("Projection", decoder_knows::<Projection>("zzz")),
             ("Shading", decoder_knows::<Shading>("zzz")),
-            ("Channel", decoder_knows::<Channel>("zzz")),
+            ("Aov", decoder_knows::<Aov>("zzz")),
             ("Encoding", decoder_knows::<Encoding>("zzz")),
             ("Compression", decoder_knows::<Compression>("zzz")),
             ("Reader", decoder_knows::<Reader>("zzz")),
+            ("Style", decoder_knows::<Style>("zzz")),
+            ("ColorBy", decoder_knows::<ColorBy>("zzz")),
+            ("Style", decoder_knows::<Style>("zzz")),
+            ("ColorBy", decoder_knows::<ColorBy>("zzz")),
             ("Axis", decoder_knows::<Axis>("zzz")),
         ] {
             assert!(!known.is_empty(), "{name}");

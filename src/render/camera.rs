@@ -9,7 +9,7 @@
 
 use thiserror::Error;
 
-use crate::geometry::{Ray, Vector, Vector64, cross, narrow, widen};
+use crate::geometry::{Dimension, Ray, Vector, Vector64, cross, narrow, widen};
 use crate::mesh::Viewpoint;
 use crate::volume::Grid;
 
@@ -119,6 +119,11 @@ fn orthogonal<const D: usize>(v: &Vector64<D>, to: &[Vector64<D>]) -> Option<Vec
     (length > 0.0 && rest.norm() > 1e-9).then(|| rest.normalize())
 }
 
+/// Whether an image has this axis: that of a 3D camera has no third, though its grid has one with a single layer.
+fn has_image_axis<const D: usize>(axis: usize) -> bool {
+    axis < D - 1
+}
+
 impl<const D: usize> Camera<D> {
     /// Finds the frame.
     ///
@@ -127,14 +132,17 @@ impl<const D: usize> Camera<D> {
     pub fn new(view: &View<D>) -> Result<Self, CameraError> {
         let back = orthogonal(&(view.eye - view.target), &[]).ok_or(CameraError::NoDirection)?;
         let (over, up, right);
-        if D == 4 {
-            over = orthogonal(&view.over, &[back]).ok_or(CameraError::OverAlongView)?;
-            up = orthogonal(&view.up, &[back, over]).ok_or(CameraError::UpAlongView)?;
-            right = cross(&[up, over, back]);
-        } else {
-            over = Vector64::zeros();
-            up = orthogonal(&view.up, &[back]).ok_or(CameraError::UpAlongView)?;
-            right = cross(&[up, back]);
+        match Dimension::of::<D>() {
+            Dimension::Three => {
+                over = Vector64::zeros();
+                up = orthogonal(&view.up, &[back]).ok_or(CameraError::UpAlongView)?;
+                right = cross(&[up, back]);
+            }
+            Dimension::Four => {
+                over = orthogonal(&view.over, &[back]).ok_or(CameraError::OverAlongView)?;
+                up = orthogonal(&view.up, &[back, over]).ok_or(CameraError::UpAlongView)?;
+                right = cross(&[up, over, back]);
+            }
         }
         // The eye is where rays start, so it is rounded like the geometry.
         Ok(Self { projection: view.projection, eye: widen(&narrow(&view.eye)), right, up, over, back })
@@ -156,7 +164,7 @@ impl<const D: usize> Camera<D> {
         let half_extent = [half * dimensions[0] as f64 / dimensions[1] as f64, half, half];
         let mut spacing: [f64; 3] = std::array::from_fn(|a| 2.0 * half_extent[a] / dimensions[a] as f64);
         let mut origin: [f64; 3] = std::array::from_fn(|a| -half_extent[a] + 0.5 * spacing[a]);
-        if D == 3 {
+        if !has_image_axis::<D>(2) {
             (spacing[2], origin[2]) = (spacing[1], 0.0);
         }
         Grid { dimensions, origin, spacing }
@@ -178,7 +186,7 @@ impl<const D: usize> Camera<D> {
     #[inline]
     pub fn voxel_ray(&self, grid: &Grid, index: [usize; 3]) -> Ray<D> {
         self.ray(std::array::from_fn(|a| {
-            if D == 3 && a == 2 {
+            if !has_image_axis::<D>(a) {
                 return 0.0;
             }
             let steps = (2 * index[a] + 1) as f64 - grid.dimensions[a] as f64;
@@ -188,9 +196,9 @@ impl<const D: usize> Camera<D> {
 
     /// All rays of an image at once, as functions of the voxel.
     pub(super) fn lens(&self, grid: &Grid) -> Lens<D> {
-        let half: [f64; 3] = std::array::from_fn(|a| match (D, a) {
-            (3, 2) => 0.0,
-            _ => 0.5 * grid.spacing[a] * (grid.dimensions[a] - 1) as f64,
+        let half: [f64; 3] = std::array::from_fn(|a| {
+            let extent = grid.spacing[a] * (grid.dimensions[a] - 1) as f64;
+            if has_image_axis::<D>(a) { 0.5 * extent } else { 0.0 }
         });
         let axes = [self.right, self.up, self.over];
         let (rays, base) = match self.projection {
@@ -207,7 +215,7 @@ impl<const D: usize> Camera<D> {
         Lens {
             rays,
             start,
-            steps: std::array::from_fn(|a| axes[a] * grid.spacing[a] * f64::from(!(D == 3 && a == 2))),
+            steps: std::array::from_fn(|a| axes[a] * grid.spacing[a] * f64::from(has_image_axis::<D>(a))),
             reach: reach.add_scalar(small),
             width: grid.dimensions[0],
         }
@@ -256,9 +264,8 @@ mod tests {
         let camera = Camera::<D>::new(&View::default()).unwrap();
         assert_eq!(camera.back, axis::<D>(D - 1));
         assert_eq!((camera.right, camera.up), (axis::<D>(0), axis::<D>(1)));
-        if D == 4 {
-            assert_eq!(camera.over, axis::<D>(2));
-        }
+        let over = [axis::<D>(2), Vector64::zeros()];
+        assert_eq!(camera.over, over[Dimension::of::<D>().pick(1, 0)]);
         // Any camera's frame is orthonormal and turns as the default one does.
         let view = View {
             eye: Vector64::from_fn(|r, _| [3.0, -1.0, 2.0, 0.5][r]),

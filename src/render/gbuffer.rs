@@ -116,6 +116,9 @@ columns! {
     albedo ALBEDO: [f32; 3] = [1.0; 3];
     /// Ambient occlusion, 1 is open; 1 where nothing is.
     occlusion OCCLUSION: f32 = 1.0;
+    /// Ambient occlusion interpolated between the simplex's vertices, where the occlusion itself is found otherwise; 1
+    /// where nothing is.
+    interpolated INTERPOLATED: f32 = 1.0;
     /// The standard error of the occlusion; 0 where nothing is.
     error ERROR: f32 = 0.0;
     /// The part of the voxel that sees something, 0 to 1.

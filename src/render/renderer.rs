@@ -87,8 +87,13 @@ impl<const D: usize> Renderer<D> {
         };
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
             let mut buffer = pass.layers(layers, columns, progress)?;
-            if let Shading::Voxel(method) = self.shading {
-                occlude::occlude(self, method, &mut buffer, progress)?;
+            match self.shading {
+                Shading::Voxel(estimator) => occlude::occlude(self, estimator, &mut buffer, progress)?,
+                Shading::Auto(_, estimator) => {
+                    buffer.interpolated.copy_from_slice(&buffer.occlusion);
+                    occlude::occlude(self, estimator, &mut buffer, progress)?;
+                }
+                Shading::None | Shading::Flat(_) | Shading::Smooth(_) => {}
             }
             Ok(buffer)
         };
@@ -135,7 +140,11 @@ impl<const D: usize> Renderer<D> {
 
 /// The columns that arrays need, with this shading.
 fn columns(shading: &Shading, aovs: &[Aov]) -> Columns {
-    let point = if matches!(shading, Shading::Voxel(_)) { occlude::COLUMNS } else { Columns::SIMPLEX };
+    let point = match shading {
+        Shading::Voxel(_) => occlude::COLUMNS,
+        Shading::Auto(..) => occlude::COLUMNS | Columns::OCCLUSION | Columns::INTERPOLATED,
+        Shading::None | Shading::Flat(_) | Shading::Smooth(_) => Columns::SIMPLEX,
+    };
     aovs.iter().fold(point, |all, aov| all | aov.columns())
 }
 

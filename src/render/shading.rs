@@ -13,6 +13,9 @@ pub enum Shading {
     Flat(Arc<Estimates>),
     /// Interpolated between the simplex's vertices' values, by barycentric coordinates.
     Smooth(Arc<Estimates>),
-    /// Computed at the point itself, on the side that faces the ray: the reference for the other two.
+    /// Computed at the point itself, on the side that faces the ray: the reference for the others.
     Voxel(Estimator),
+    /// Interpolated, and mended by how far that is off: by few rays at the point itself, whose difference from the
+    /// interpolated value is denoised.
+    Auto(Arc<Estimates>, Estimator),
 }

@@ -147,7 +147,7 @@ impl<const D: usize> SurfacePass<'_, D> {
         let equal = [1.0 / D as f64; D];
         let (estimates, weights) = match self.shading {
             Shading::Flat(estimates) => (estimates, &equal),
-            Shading::Smooth(estimates) => (estimates, &hit.crossing.barycentric),
+            Shading::Smooth(estimates) | Shading::Auto(estimates, _) => (estimates, &hit.crossing.barycentric),
             Shading::None | Shading::Voxel(_) => return (1.0, 0.0),
         };
         let value = match self.shading {

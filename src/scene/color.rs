@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
+use crate::text::number;
 
 /// A colour: a grey from 0 to 1, `[red, green, blue]` from 0 to 1 each, or `"#rrggbb"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,7 +39,7 @@ impl Color {
                 .ok_or_else(|| wrong(format!("\"{text}\" is not a colour; write \"#\" and six hexadecimal digits")))?,
         };
         match rgb.iter().find(|x| !(0.0..=1.0).contains(*x)) {
-            Some(x) => Err(wrong(format!("{x} is not from 0 to 1"))),
+            Some(x) => Err(wrong(format!("{} is not from 0 to 1", number(*x)))),
             None => Ok(rgb.map(|x| x as f32)),
         }
     }

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::lattice::Lattice;
-use super::numbers::{OneOrEach, bounds, check_count, positive, subdivisions};
+use super::numbers::{OneOrEach, bounds, check_count, only_in, positive, subdivisions};
 use super::product::Chain;
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
 use crate::mesh::Surface;
 
 fn one() -> OneOrEach<u32> {
@@ -64,9 +64,7 @@ fn two() -> f64 {
 impl TesseractSpec {
     /// The tesseract's boundary; refused in 3D.
     pub fn build<const D: usize>(&self) -> Result<Surface<D>, Error> {
-        if D != 4 {
-            return Err(Error::invalid("tesseract", format!("needs a scene of dimension 4, not {D}; take a box")));
-        }
+        only_in::<D>(Dimension::Four, "tesseract", "; take a box")?;
         let half = positive("tesseract.size", self.size)? / 2.0;
         let pieces = subdivisions("tesseract.subdivisions", &OneOrEach::One(self.subdivisions))?;
         let corner = Vector64::from_element(half);
@@ -82,7 +80,7 @@ fn cuboid<const D: usize>(
 ) -> Result<Surface<D>, Error> {
     // Two opposite facets for each axis, each of as many pieces as the other axes make, each piece of (D-1)! simplices.
     let others = |axis| (0..D).filter(|&a| a != axis).map(|a| u128::from(pieces[a])).product::<u128>();
-    check_count(key, (0..D).map(|axis| 2 * others(axis) * if D == 3 { 2 } else { 6 }).sum())?;
+    check_count(key, (0..D).map(|axis| 2 * others(axis) * u128::from(Dimension::of::<D>().simplices_a_cube())).sum())?;
     let lattice_points: u128 = pieces.iter().map(|&n| u128::from(n) + 1).product();
     if lattice_points > u128::from(u32::MAX) {
         return Err(Error::invalid(key, "too many pieces: the lattice they form has more than 2^32 points"));

@@ -16,7 +16,7 @@ use super::lattice::{Lattice, divide};
 use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, check_count, subdivisions};
 use crate::geometry::Vector64;
 use crate::mesh::Surface;
-use crate::mesh::topology::sort_with_parity;
+use crate::mesh::facets::sort_with_parity;
 
 fn one() -> OneOrEach<u32> {
     OneOrEach::One(1)

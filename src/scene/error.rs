@@ -13,6 +13,9 @@ pub enum Error {
         /// What was found, and what to do about it.
         message: String,
     },
+    /// Whoever watches wants no more of it.
+    #[error("stopped")]
+    Cancelled,
     /// A file that the object names can't be taken in.
     #[error(transparent)]
     Input(#[from] InputError),
@@ -28,6 +31,7 @@ impl Error {
     pub fn key(&self) -> &str {
         match self {
             Self::Invalid { key, .. } => key,
+            Self::Cancelled => "",
             Self::Input(error) => error.key(),
         }
     }

@@ -22,16 +22,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
-use super::fill::fill;
+use super::fill::{Unfilled, fill};
 use super::lattice::compact;
-use super::numbers::{check_count, finite, point};
+use super::numbers::{check_count, finite, only_in, point};
 use super::product::Chain;
 use super::transform::{self, TransformStep};
-use crate::geometry::{Vector64, determinant};
+use crate::geometry::{Dimension, Vector64, determinant};
 use crate::io::Input;
 use crate::io::mesh::Cells;
 use crate::mesh::Surface;
 use crate::mesh::weld::weld;
+use crate::progress::Progress;
 
 /// A mesh from a file, swept along the fourth axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -67,10 +68,8 @@ fn one() -> u32 {
 
 impl ExtrudeSpec {
     /// The walls, and caps if the mesh is of tetrahedra. Refused in 3D.
-    pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
-        if D != 4 {
-            return Err(Error::invalid("extrude", format!("needs a scene of dimension 4, not {D}; take file")));
-        }
+    pub fn build<const D: usize>(&self, folder: &Path, progress: &dyn Progress) -> Result<Surface<D>, Error> {
+        only_in::<D>(Dimension::Four, "extrude", "; take file")?;
         let (from, to) = (finite("extrude.from", self.from)?, finite("extrude.to", self.to)?);
         if from == to {
             return Err(Error::invalid("extrude.to", format!("{to} is also where the sweep begins; give another")));
@@ -94,7 +93,11 @@ impl ExtrudeSpec {
                 let (points, triangles) = weld(&mesh.points, triangles);
                 let interval = Chain::interval(self.layers);
                 if self.caps == Some(true) {
-                    let (points, tetrahedra) = fill(&points, &triangles).map_err(|message| input.wrong(message))?;
+                    let (points, tetrahedra) =
+                        fill(&points, &triangles, progress).map_err(|unfilled| match unfilled {
+                            Unfilled::Cancelled => Error::Cancelled,
+                            Unfilled::Refused(message) => input.wrong(message).into(),
+                        })?;
                     let solid = Chain::of(points.len() as u32, &tetrahedra);
                     self.check_size(points.len(), solid.len(), solid.boundary().len())?;
                     Swept { points, chain: solid.boundary_of_product(&interval) }

@@ -8,6 +8,7 @@
 use std::path::Path;
 
 use super::numbers::MAX_SIMPLICES;
+use crate::geometry::{Dimension, Vector64};
 use crate::io::mesh::Cells;
 use crate::io::{Input, InputError};
 use crate::mesh::Surface;
@@ -24,19 +25,20 @@ pub fn build<const D: usize>(path: &Path, folder: &Path, notes: &mut Vec<String>
         Cells::Tetrahedra(tetrahedra) => of_size(tetrahedra),
     };
     let Some(simplices) = simplices else {
-        return Err(input.wrong(if D == 4 {
-            "holds triangles; a scene of dimension 4 is made of tetrahedra: take extrude, or dimension: 3"
-        } else {
-            "holds tetrahedra; a scene of dimension 3 is made of triangles"
+        return Err(input.wrong(match Dimension::of::<D>() {
+            Dimension::Three => "holds tetrahedra; a scene of dimension 3 is made of triangles",
+            Dimension::Four => {
+                "holds triangles; a scene of dimension 4 is made of tetrahedra: take extrude, or dimension: 3"
+            }
         }));
     };
     if simplices.len() as u64 > MAX_SIMPLICES {
         return Err(input.wrong(format!("holds {} simplices; the most is {MAX_SIMPLICES}", simplices.len())));
     }
-    let vertices = match position {
-        Some(position) => position,
-        None if D == 3 => mesh.points.iter().map(|p| crate::geometry::Vector64::from_fn(|row, _| p[row])).collect(),
-        None => {
+    let vertices = match (position, Dimension::of::<D>()) {
+        (Some(position), _) => position,
+        (None, Dimension::Three) => mesh.points.iter().map(|p| Vector64::from_fn(|row, _| p[row])).collect(),
+        (None, Dimension::Four) => {
             return Err(input.wrong(
                 "has no point array \"position\" of 4 components; extrude sweeps a three-dimensional mesh along w",
             ));

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::Error;
 use super::numbers::{check_count, point, positive};
 use super::polytope;
-use crate::geometry::{Vector64, determinant};
+use crate::geometry::{Dimension, Vector64, determinant};
 use crate::mesh::Surface;
 
 /// A closed sphere made of flat simplices whose vertices lie on it.
@@ -68,16 +68,16 @@ impl SphereSpec {
                 check_count(&key, (1 << D) * pieces)?;
                 cross_polytope::<D>(self.subdivisions as i32)
             }
-            Base::Cell600 if D == 4 => {
-                check_count(&key, 600 * pieces)?;
-                polytope::regular::<D>(polytope::Cells::Cell600, self.subdivisions)
-            }
-            Base::Cell600 => {
-                return Err(Error::invalid(
-                    format!("{shape}.from"),
-                    "a sphere of dimension 3 is made from 16-cell only",
-                ));
-            }
+            Base::Cell600 => match Dimension::of::<D>() {
+                Dimension::Three => {
+                    let message = "a sphere of dimension 3 is made from 16-cell only";
+                    return Err(Error::invalid(format!("{shape}.from"), message));
+                }
+                Dimension::Four => {
+                    check_count(&key, 600 * pieces)?;
+                    polytope::regular::<D>(polytope::Cells::Cell600, self.subdivisions)
+                }
+            },
         };
         for vertex in &mut surface.vertices {
             *vertex = center + *vertex * (radius / vertex.norm());

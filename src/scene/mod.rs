@@ -47,7 +47,9 @@ pub use extrude::ExtrudeSpec;
 pub use hypersphere::{Base, SphereSpec};
 pub use isosurface::IsosurfaceSpec;
 pub use numbers::{MAX_SIMPLICES, OneOrEach};
-pub use object::{ObjectSpec, Orientation, Shape, build_object, build_object_with_notes};
+pub use object::{
+    CreaseAngle, ObjectSpec, Orientation, Shape, build_object, build_object_watched, build_object_with_notes,
+};
 pub use polytope::PolytopeSpec;
 pub use products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 pub use simplices::SimplicesSpec;

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
+use crate::text::number;
 
 /// The axes' names, in order.
 pub const AXES: [&str; 4] = ["x", "y", "z", "w"];
@@ -56,7 +57,7 @@ pub fn finite(key: &str, x: f64) -> Result<f64, Error> {
 
 /// A number above zero.
 pub fn positive(key: &str, x: f64) -> Result<f64, Error> {
-    if x.is_finite() && x > 0.0 { Ok(x) } else { Err(Error::invalid(key, format!("{x} is not above 0"))) }
+    if x.is_finite() && x > 0.0 { Ok(x) } else { Err(Error::invalid(key, format!("{} is not above 0", number(x)))) }
 }
 
 /// The lower and upper corner of a box with an inside.
@@ -83,6 +84,14 @@ pub fn subdivisions<const D: usize>(key: &str, given: &OneOrEach<u32>) -> Result
         return Err(Error::invalid(key, "0 subdivisions; the least is 1"));
     }
     Ok(each)
+}
+
+/// Refuses a shape, written at `key`, in scenes of the dimension that has none of it; `instead` ends the message.
+pub fn only_in<const D: usize>(wanted: Dimension, key: &str, instead: &str) -> Result<(), Error> {
+    if wanted == Dimension::of::<D>() {
+        return Ok(());
+    }
+    Err(Error::invalid(key, format!("needs a scene of dimension {wanted}, not {D}{instead}")))
 }
 
 /// Refuses an object with more simplices than [`MAX_SIMPLICES`], before it is built.

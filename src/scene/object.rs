@@ -11,14 +11,18 @@ use super::cut_cube::CutCubeSpec;
 use super::extrude::ExtrudeSpec;
 use super::hypersphere::SphereSpec;
 use super::isosurface::IsosurfaceSpec;
-use super::numbers::AXES;
+use super::numbers::{AXES, only_in};
 use super::polytope::PolytopeSpec;
 use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
-use crate::mesh::Surface;
+use crate::geometry::Dimension;
+use crate::mesh::corners::DEFAULT_ANGLE;
+use crate::mesh::rounding::turned_over;
+use crate::mesh::{Crease, Surface};
+use crate::progress::{Progress, Silent};
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -82,6 +86,29 @@ pub struct ObjectSpec {
     /// Which way an open surface faces.
     #[serde(default)]
     pub orientation: Orientation,
+    /// Where the surface creases: neighbours whose normals differ by more than this, in degrees, have a shading point each
+    /// at the vertices between them. 30 if left out, or more for an isosurface that is rough all over; listed simplices
+    /// keep their vertices. `off`: one normal a vertex.
+    #[serde(default)]
+    pub crease_angle: Option<CreaseAngle>,
+}
+
+/// An angle in degrees, or `off`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected degrees from 0 to 180, or off")]
+pub enum CreaseAngle {
+    /// Degrees, from 0 to 180.
+    Degrees(f64),
+    /// No creases.
+    Off(Off),
+}
+
+/// The word `off`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Off {
+    /// It.
+    Off,
 }
 
 /// Which way an open surface faces.
@@ -152,32 +179,47 @@ impl Shape<'_> {
         }
     }
 
-    /// The files it is read from, as the pipeline names them.
-    pub fn input_files(&self) -> Vec<&Path> {
+    /// The files it is read from, those among them that only a header names; paths are relative to `folder`.
+    pub fn input_files(&self, folder: &Path) -> Vec<PathBuf> {
         match self {
-            Shape::File(path) => vec![path],
-            Shape::Extrude(spec) => vec![&spec.mesh],
-            Shape::Spin(spec) => vec![&spec.mesh],
-            Shape::Isosurface(spec) => spec.input_files(),
+            Shape::File(path) => vec![folder.join(path)],
+            Shape::Extrude(spec) => vec![folder.join(&spec.mesh)],
+            Shape::Spin(spec) => vec![folder.join(&spec.mesh)],
+            Shape::Isosurface(spec) => spec.input_files(folder),
             _ => Vec::new(),
         }
     }
 
+    /// Which simplices fill a solid within triangles, one flag a simplex; none if the shape fills no such solid. Those lie
+    /// across the last axis, before the surface is placed.
+    fn solid_simplices<const D: usize>(&self, surface: &Surface<D>) -> Vec<bool> {
+        if !matches!(self, Shape::Extrude(spec) if spec.caps == Some(true)) {
+            return Vec::new();
+        }
+        let last = |v: u32| surface.vertices[v as usize][D - 1];
+        surface.simplices.iter().map(|simplex| simplex.iter().all(|&v| last(v) == last(simplex[0]))).collect()
+    }
+
     /// The surface, before it is placed.
-    fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
+    fn build<const D: usize>(
+        &self,
+        folder: &Path,
+        notes: &mut Vec<String>,
+        progress: &dyn Progress,
+    ) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
             Shape::File(path) => Ok(file::build(path, folder, notes)?),
-            Shape::Extrude(spec) => spec.build(folder),
+            Shape::Extrude(spec) => spec.build(folder, progress),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),
             Shape::Tesseract(spec) => spec.build(),
             Shape::Hypersphere(spec) => spec.build("hypersphere"),
-            Shape::Sphere(_) if D != 3 => {
-                Err(Error::invalid("sphere", format!("needs a scene of dimension 3, not {D}; take a hypersphere")))
+            Shape::Sphere(spec) => {
+                only_in::<D>(Dimension::Three, "sphere", "; take a hypersphere")?;
+                spec.build("sphere")
             }
-            Shape::Sphere(spec) => spec.build("sphere"),
-            Shape::Isosurface(spec) => spec.build(folder, notes),
+            Shape::Isosurface(spec) => spec.build(folder, notes, progress),
             Shape::Spin(spec) => spec.build(folder),
             Shape::Polytope(spec) => spec.build(),
             Shape::Duoprism(spec) => spec.build(),
@@ -224,6 +266,23 @@ impl ObjectSpec {
     }
 }
 
+impl ObjectSpec {
+    /// Where the object's vertices are split.
+    pub fn crease(&self) -> Result<Crease, Error> {
+        Ok(match (self.crease_angle, self.shape()?) {
+            (Some(CreaseAngle::Off(Off::Off)), _) => Crease::Never,
+            (Some(CreaseAngle::Degrees(degrees)), _) if (0.0..=180.0).contains(&degrees) => Crease::Above(degrees),
+            (Some(CreaseAngle::Degrees(degrees)), _) => {
+                let message = format!("expected degrees from 0 to 180, or off, found {degrees}");
+                return Err(Error::invalid("crease_angle", message));
+            }
+            (None, Shape::Simplices(_)) => Crease::Never,
+            (None, Shape::Isosurface(_)) => Crease::Rough,
+            (None, _) => Crease::Above(DEFAULT_ANGLE),
+        })
+    }
+}
+
 /// The object's surface where the scene has it. Paths are relative to `folder`.
 pub fn build_object<const D: usize>(spec: &ObjectSpec, folder: &Path) -> Result<Surface<D>, Error> {
     build_object_with_notes(spec, folder, &mut Vec::new())
@@ -235,9 +294,20 @@ pub fn build_object_with_notes<const D: usize>(
     folder: &Path,
     notes: &mut Vec<String>,
 ) -> Result<Surface<D>, Error> {
+    build_object_watched(spec, folder, notes, &Silent)
+}
+
+/// The same, stopped with [`Error::Cancelled`] soon after `progress` says so.
+pub fn build_object_watched<const D: usize>(
+    spec: &ObjectSpec,
+    folder: &Path,
+    notes: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Surface<D>, Error> {
     let shape = spec.shape()?;
     spec.color.rgb()?;
-    let mut surface = shape.build::<D>(folder, notes)?;
+    let mut surface = shape.build::<D>(folder, notes, progress)?;
+    let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;
     // Coordinates are rounded to single precision afterwards and must survive that.
     let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);
@@ -249,5 +319,23 @@ pub fn build_object_with_notes<const D: usize>(
             format!("vertex {i} has {} = {:e}, beyond single precision (3.4e38)", AXES[axis], vertex[axis]),
         ));
     }
+    if !solid.is_empty() {
+        check_solid(&surface, &solid)?;
+    }
     Ok(surface)
+}
+
+/// Refuses a filled solid whose tetrahedra fold over when rounded: it would shadow itself.
+fn check_solid<const D: usize>(surface: &Surface<D>, solid: &[bool]) -> Result<(), Error> {
+    let turned: Vec<u32> = turned_over(surface).into_iter().filter(|&s| solid[s as usize]).collect();
+    let Some(&first) = turned.first() else { return Ok(()) };
+    let at: Vec<String> =
+        surface.vertices[surface.simplices[first as usize][0] as usize].iter().map(|x| format!("{x:.6}")).collect();
+    let message = format!(
+        "{} tetrahedra of the solid within fold over when rounded to single precision, the first near ({}): the mesh has \
+         parts too thin for its size and place; simplify it there, or move it nearer to the origin",
+        turned.len(),
+        at.join(", ")
+    );
+    Err(Error::invalid("extrude.caps", message))
 }

@@ -27,8 +27,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::hypersphere::standard_facet;
-use super::numbers::{check_count, positive};
-use crate::geometry::{Vector64, determinant};
+use super::numbers::{check_count, only_in, positive};
+use crate::geometry::{Dimension, Vector64, determinant};
 use crate::mesh::Surface;
 
 /// How much shorter two lengths may be and still count as the same; all lengths here are near 1.
@@ -95,12 +95,7 @@ impl Cells {
 impl PolytopeSpec {
     /// The polytope's boundary; refused in 3D.
     pub fn build<const D: usize>(&self) -> Result<Surface<D>, Error> {
-        if D != 4 {
-            return Err(Error::invalid(
-                "polytope",
-                format!("needs a scene of dimension 4, not {D}; take box or sphere"),
-            ));
-        }
+        only_in::<D>(Dimension::Four, "polytope", "; take box or sphere")?;
         let Some(cells) = Cells::of(self.cells) else {
             let message = format!("there is none of {} cells; the six have 5, 8, 16, 24, 120 and 600", self.cells);
             return Err(Error::invalid("polytope.cells", message));
@@ -254,7 +249,7 @@ fn subdivide<const D: usize>(surface: &Surface<D>, n: u32) -> Surface<D> {
     let mut indices: HashMap<[(u32, i32); D], u32> = HashMap::new();
     for simplex in &surface.simplices {
         let mut sorted = *simplex;
-        let odd = crate::mesh::topology::sort_with_parity(&mut sorted);
+        let odd = crate::mesh::facets::sort_with_parity(&mut sorted);
         let corners = sorted.map(|i| surface.vertices[i as usize]);
         for piece in &pattern {
             let mut vertices = piece.map(|parts| {

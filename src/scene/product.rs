@@ -15,7 +15,7 @@
 //! d[v_0 ... v_D] = sum of (-1)^i [... v_i left out ...], the facet opposite v_0 has the normal n for which
 //! n . (v_1 - v_0) = det[v_1 - v_0, v_2 - v_1, ...] > 0.
 
-use crate::mesh::topology::sort_with_parity;
+use crate::mesh::facets::sort_with_parity;
 
 /// Vertices of the largest simplex a chain holds: a tetrahedron.
 const MOST: usize = 4;

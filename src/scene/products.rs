@@ -17,9 +17,9 @@ use serde::{Deserialize, Serialize};
 use super::Error;
 use super::disc::{ball, disc};
 use super::lattice::compact;
-use super::numbers::{check_count, positive};
+use super::numbers::{check_count, only_in, positive};
 use super::product::Chain;
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
 use crate::mesh::Surface;
 
 /// Corners of the polygons whose sectors discs are made of.
@@ -92,9 +92,7 @@ fn one() -> u32 {
 
 /// Refuses other dimensions than 4, and subdivisions that are none or too many.
 fn check<const D: usize>(shape: &str, key: &str, subdivisions: u32) -> Result<(), Error> {
-    if D != 4 {
-        return Err(Error::invalid(shape, format!("needs a scene of dimension 4, not {D}")));
-    }
+    only_in::<D>(Dimension::Four, shape, "")?;
     let path = format!("{shape}.{key}");
     match subdivisions {
         0 => Err(Error::invalid(path, format!("0 {key}; the least is 1"))),

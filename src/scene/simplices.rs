@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::numbers::point;
+use crate::geometry::Dimension;
 use crate::mesh::Surface;
 
 /// Vertices and simplices over them: tetrahedra in 4D, triangles in 3D.
@@ -40,7 +41,7 @@ impl SimplicesSpec {
 
 fn check<const D: usize>(cell: &[u32], vertices: usize) -> Result<[u32; D], String> {
     let cell: [u32; D] = cell.try_into().map_err(|_| {
-        let kind = if D == 3 { "triangle" } else { "tetrahedron" };
+        let kind = Dimension::of::<D>().simplex();
         format!("expected the {D} vertices of a {kind}, found {}", cell.len())
     })?;
     for (i, &vertex) in cell.iter().enumerate() {

@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::extrude::solid;
-use super::numbers::{AXES, check_count, finite};
+use super::numbers::{AXES, check_count, finite, only_in};
 use super::product::Chain;
-use crate::geometry::Vector64;
+use crate::geometry::{Dimension, Vector64};
 use crate::io::Input;
 use crate::io::mesh::Cells;
 use crate::mesh::Surface;
@@ -42,9 +42,7 @@ pub struct SpinSpec {
 impl SpinSpec {
     /// The surface of revolution. Refused in 3D.
     pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
-        if D != 4 {
-            return Err(Error::invalid("spin", format!("needs a scene of dimension 4, not {D}")));
-        }
+        only_in::<D>(Dimension::Four, "spin", "")?;
         let axis = match self.plane.as_deref() {
             None | Some("xw") => 0,
             Some("yw") => 1,

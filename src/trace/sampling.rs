@@ -15,7 +15,7 @@
 
 use rand::{Rng, SeedableRng, rngs::ChaCha8Rng};
 
-use crate::geometry::{Frame, Vector};
+use crate::geometry::{Dimension, Frame, Vector};
 
 /// Lowest squared cosine that a direction gets. A direction closer to the horizon is raised to it, so that rounding
 /// can't put it below; this touches 1.5 rays in a million, and moves each by less than 0.06 degrees.
@@ -127,17 +127,16 @@ impl Sequence {
     /// The next direction around the frame's normal, of length about 1.
     #[inline]
     pub fn next_direction<const D: usize>(&mut self, frame: &Frame<D>) -> Vector<D> {
-        let [a, b, c] = if D == 4 {
-            self.next_point::<3>()
-        } else {
-            let [a, b] = self.next_point::<2>();
-            [a, b, 0.0]
-        };
         let mut local = Vector::<D>::zeros();
-        if D == 4 {
-            local.as_mut_slice()[..3].copy_from_slice(&cube_to_ball(a, b, c));
-        } else {
-            local.as_mut_slice()[..2].copy_from_slice(&square_to_disk(a, b));
+        match Dimension::of::<D>() {
+            Dimension::Three => {
+                let [a, b] = self.next_point();
+                local.as_mut_slice()[..2].copy_from_slice(&square_to_disk(a, b));
+            }
+            Dimension::Four => {
+                let [a, b, c] = self.next_point();
+                local.as_mut_slice()[..3].copy_from_slice(&cube_to_ball(a, b, c));
+            }
         }
         direction(&mut local, frame)
     }

@@ -1,25 +1,26 @@
 //! What the mesh right around a shading point hides, and whether a ray from there escapes.
 //!
 //! No ray can be traced against a simplex that has the ray's origin as a corner: it would hit at distance 0. What such a
-//! simplex hides is a cone of directions instead, spanned by its edges from there and by the inverted normal. All the
+//! simplex hides is a cone of directions instead, spanned by its edges from there and by the inverted normal, or by the
+//! inverse of another way to the vertex where other faces or bodies meet it ([`crate::mesh::approach`]). All the
 //! simplices around a vertex are its star.
 
 use crate::accel::Tracer;
 use crate::geometry::{Column, Cone, Frame, Ray, Vector, widen};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, approach};
 
 use super::point::ShadingPoint;
 
-/// What a simplex with a corner at the point hides: the cone of its edges from there and -normal. None if it is wholly
+/// What a simplex with a corner at the point hides: the cone of its edges from there and -approach. None if it is wholly
 /// below the tangent hyperplane, and hides nothing above it.
 pub(super) fn star_cone<const D: usize>(
     mesh: &Mesh<D>,
     position: Vector<D>,
-    normal: Vector<D>,
+    [normal, approach]: [Vector<D>; 2],
     identity: u32,
     simplex: u32,
 ) -> Option<Cone<D>> {
-    let mut columns = [Column::vector(-normal); D];
+    let mut columns = [Column::vector(-approach); D];
     let mut rises = false;
     let others = mesh.simplices[simplex as usize].into_iter();
     for (column, v) in columns.iter_mut().zip(others.filter(|&v| mesh.identity[v as usize] != identity)) {
@@ -37,8 +38,9 @@ pub(super) fn star_cones<const D: usize>(tracer: &Tracer<D>, point: &ShadingPoin
     let mesh = tracer.mesh();
     let (position, normal) = (mesh.vertices[vertex as usize], mesh.normals[vertex as usize]);
     let identity = mesh.identity[vertex as usize];
-    let around = tracer.incidence().around(identity).iter();
-    around.filter_map(|&simplex| star_cone(mesh, position, normal, identity, simplex)).collect()
+    let around = tracer.incidence().around(identity);
+    let ways = [normal, approach(mesh, around, vertex)];
+    around.iter().filter_map(|&simplex| star_cone(mesh, position, ways, identity, simplex)).collect()
 }
 
 /// A shading point with all that decides whether a ray from there escapes. This is the slow way, which defines it.

@@ -5,8 +5,9 @@ use std::process::{Command, Output};
 
 use ao4d::io::vtk;
 use ao4d::occlusion::{Sidecar, decode};
-use ao4d::pipeline::{AnyMesh, Pipeline, Settings, run};
+use ao4d::pipeline::{Pipeline, Settings, run};
 use ao4d::progress::Silent;
+use ao4d::stages::scene::AnyMesh;
 
 fn ao4d(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ao4d")).current_dir(folder).args(arguments).output().unwrap()

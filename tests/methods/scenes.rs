@@ -6,7 +6,8 @@ use ao4d::accel::Tracer;
 use ao4d::geometry::Vector64;
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
 use ao4d::occlusion::exact::{Budget, Hemisphere};
-use ao4d::pipeline::{AnyMesh, Pipeline};
+use ao4d::pipeline::Pipeline;
+use ao4d::stages::scene::AnyMesh;
 use ao4d::trace::ShadingPoint;
 
 /// A mesh, and which of its vertices are looked at: some 100 at most, evenly spread.

@@ -47,4 +47,4 @@ assert not absolute, "absolute paths: %s" % absolute
 long = [line for line in text.splitlines() if len(line) > 120 and "'caption'" not in line and "'origin'" not in line]
 assert not long, "long lines: %s" % long
 
-print(json.dumps({k: v for k, v in constants.items() if not k.startswith("VOXELS_")}))
+print(json.dumps({k: v for k, v in constants.items() if not k.startswith(("VOXELS_", "BODIES_"))}))

@@ -1,38 +1,82 @@
-//! `.vti`, VTK's images, one array of numbers on the points.
+//! `.vti`, VTK's images: one array of numbers, on the points or in the cells, and `TimeValue` from the field data.
 
 use std::path::Path;
 
-use super::{Header, Held, Image, Request, room_for};
-use crate::io::vtk;
-use crate::volume;
+use super::axes::{Axis, Opened, Positions, Role};
+use super::numbers::Held;
+use super::{Request, room_for};
+use crate::io::vtk::{self, DataSet, Field};
+use crate::volume::Array;
 
-pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Image, String> {
-    room_for(length.saturating_mul(2))?;
-    let image = vtk::read_volume(path).map_err(|error| {
+/// Arrays that VTK adds of its own accord, to say which points count.
+const VTKS_OWN: [&str; 3] = ["vtkValidPointMask", "vtkGhostType", "vtkGhostLevels"];
+
+pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened, String> {
+    room_for(length.saturating_mul(2), "this format is read as a whole")?;
+    let image = vtk::read(path).map_err(|error| {
         // The error names the file, as whoever asked does.
         let text = error.to_string();
         text.strip_prefix(&format!("{}: ", path.display())).map_or(text.clone(), str::to_owned)
     })?;
-    let scalars: Vec<&volume::Array> = image.arrays.iter().filter(|array| array.components == 1).collect();
-    let known = || image.arrays.iter().map(|array| array.name.clone()).collect::<Vec<_>>().join(", ");
-    let array = match (&request.array, scalars.as_slice()) {
-        (Some(name), _) => scalars
-            .iter()
-            .find(|array| array.name == *name)
-            .ok_or_else(|| format!("has no array \"{name}\" of one number a point; there are {}", known()))?,
-        (None, [one]) => one,
-        (None, several) => {
-            let count = several.len();
-            return Err(format!("has {count} arrays of one number a point; give array, one of {}", known()));
-        }
+    let DataSet::Image(image) = image else {
+        return Err("holds a mesh, not an image; resample it to an image (in ParaView: Resample To Image)".into());
     };
-    let volume::Grid { dimensions: [x, y, z], origin, spacing } = image.grid;
-    let points = [x, y, z, 1];
-    let values = array.values.to_f64();
-    if values.len() != x * y * z {
-        return Err(format!("its array \"{}\" has {} values for {} points", array.name, values.len(), x * y * z));
+    let (array, on_cells) = choose(&image, request.array.as_deref())?;
+    let direction =
+        |axis: usize| std::array::from_fn(|row| if row < 3 { image.direction[3 * row + axis] } else { 0.0 });
+    let mut origin = [image.grid.origin[0], image.grid.origin[1], image.grid.origin[2], 0.0];
+    let mut axes = Vec::new();
+    for (i, role) in [Role::X, Role::Y, Role::Z].into_iter().enumerate() {
+        let (points, step) = (image.grid.dimensions[i], image.grid.spacing[i]);
+        let mut axis =
+            Axis::new(role.name(), Some(role), if on_cells { (points - 1).max(1) } else { points }).spaced(step);
+        let vector: [f64; 4] = direction(i);
+        // Values of cells are those of their middles.
+        if on_cells && points > 1 {
+            (0..3).for_each(|k| origin[k] += vector[k] * step / 2.0);
+        }
+        axis.direction = Some(vector);
+        axes.push(axis);
     }
-    let header =
-        Header::even(points, [origin[0], origin[1], origin[2], 0.0], [spacing[0], spacing[1], spacing[2], 1.0]);
-    Ok(Image { header, slices: Box::new(Held::new(values, points)) })
+    let count: usize = axes.iter().map(|axis| axis.size).product();
+    if array.values.len() != count * array.components {
+        return Err(format!("its array \"{}\" has {} values for {count} points", array.name, array.values.len()));
+    }
+    if array.components > 1 {
+        axes.insert(0, Axis::new(&array.name, Some(Role::Channel), array.components));
+    }
+    let time = image.field_data.iter().find_map(|field| match field {
+        Field::Numbers(array) if array.name == "TimeValue" && !array.values.is_empty() => Some(array.values.get(0)),
+        _ => None,
+    });
+    let mut axis = Axis::new("time", Some(Role::Time), 1);
+    if let Some(time) = time.filter(|time| time.is_finite()) {
+        axis.positions = Positions::Listed(vec![time]);
+    }
+    axes.push(axis);
+    let number = array.values.kind().vtk_name().to_lowercase();
+    let mut opened = Opened::new("VTK image", axes, number, Box::new(Held::new(array.values.to_f64())));
+    (opened.origin, opened.has_times) = (origin, time.is_some());
+    Ok(opened)
+}
+
+/// The array that is asked for, or the only one that there is; and whether it lies in the cells.
+fn choose<'a>(image: &'a vtk::Image, name: Option<&str>) -> Result<(&'a Array, bool), String> {
+    let all = || image.point_arrays.iter().map(|a| (a, false)).chain(image.cell_arrays.iter().map(|a| (a, true)));
+    let known = || all().map(|(array, _)| array.name.clone()).collect::<Vec<_>>().join(", ");
+    if let Some(name) = name {
+        return all()
+            .find(|(array, _)| array.name == name)
+            .ok_or_else(|| format!("has no array \"{name}\"; there are {}", known()));
+    }
+    let meant: Vec<_> = all().filter(|(array, _)| !VTKS_OWN.contains(&array.name.as_str())).collect();
+    let scalars: Vec<_> = meant.iter().filter(|(array, _)| array.components == 1).collect();
+    match (meant.as_slice(), scalars.as_slice()) {
+        (&[one], _) | (_, &[&one]) => Ok(one),
+        ([], _) => Err("has no array of numbers".into()),
+        (_, several) => {
+            let count = several.len();
+            Err(format!("has {count} arrays of one number a point; give array, one of {}", known()))
+        }
+    }
 }

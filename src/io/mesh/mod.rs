@@ -104,7 +104,7 @@ impl Input {
             let known = "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp or .vtu";
             return Err(self.wrong(format!("can't tell what it holds; {known}")));
         }
-        let bytes = std::fs::read(&self.path).map_err(|source| self.unreadable(source))?;
+        let bytes = crate::input::read(&self.path).map_err(|source| self.unreadable(source))?;
         if bytes.is_empty() {
             return Err(self.wrong("is empty"));
         }

@@ -251,7 +251,9 @@ impl<W: Write + Seek> VtiWriter<W> {
     }
 
     fn before_arrays(&self) -> String {
-        head::before_arrays(&self.grid, &self.settings, self.arrays.first().map(|a| &a.spec))
+        // `opacity` wherever it is: ParaView 5.11 aborts in Contour where the active array has several components.
+        let opacity = self.arrays.iter().find(|a| a.spec.name == "opacity");
+        head::before_arrays(&self.grid, &self.settings, opacity.or(self.arrays.first()).map(|a| &a.spec))
     }
 
     /// Compressed arrays behind the head, now that their lengths are known.

@@ -24,6 +24,7 @@ mod error;
 mod image;
 mod legacy;
 mod mesh;
+mod nesting;
 
 use std::path::Path;
 
@@ -94,7 +95,7 @@ impl Wanted<'_> {
 /// # Errors
 /// If it cannot be read, is damaged, cut short, or foreign.
 pub fn read(path: &Path) -> Result<DataSet, Error> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     parse(&bytes).map_err(|problem| Error::File { path: path.into(), problem })
 }
 
@@ -145,6 +146,7 @@ pub fn parse_wanted(bytes: &[u8], wanted: Wanted<'_>) -> Result<DataSet, Problem
         return legacy::read(bytes, wanted);
     }
     let parts = document::cut(bytes)?;
+    nesting::check(&parts.head)?;
     let xml = roxmltree::Document::parse(&parts.head).map_err(|e| Problem::Xml(e.to_string()))?;
     let document = document::Document::new(xml.root_element(), parts.appended, wanted)?;
     match document.kind {

@@ -3,7 +3,7 @@
 use nalgebra::RealField;
 
 use super::Deviations;
-use crate::geometry::{Ray, Vector, Vector64, widen};
+use crate::geometry::{Dimension, Ray, Vector, Vector64, widen};
 
 /// A point or vector of either precision.
 type Point<T, const D: usize> = nalgebra::SVector<T, D>;
@@ -31,9 +31,13 @@ pub(super) fn cramer<T: RealField + Copy, const D: usize>(
     let mut right = origin - a;
     if deviations.printed_equations {
         columns[0] = *direction;
-        if D == 4 {
-            columns[3] = corners[3].map(|x| x - a[0]);
-            right[1] = origin[1] - a[0];
+        match Dimension::of::<D>() {
+            // The thesis prints them for 4D only.
+            Dimension::Three => {}
+            Dimension::Four => {
+                columns[3] = corners[3].map(|x| x - a[0]);
+                right[1] = origin[1] - a[0];
+            }
         }
     }
     let denominator = laplace(&columns, deviations.contracted);

@@ -22,8 +22,10 @@
 //! Each deviation is a switch of its own ([`Deviations`]); with all of them off the truth is left. The hierarchy is used to save time:
 //! hits that rounding finds outside a simplex's box aren't seen.
 
+mod as_programmed;
 mod cramer;
 
+pub use as_programmed::{AsProgrammed, ProgramDeviations};
 pub use cramer::plain_cramer;
 
 use cramer::{cramer, laplace};
@@ -77,6 +79,16 @@ impl Deviations {
     };
 }
 
+/// The formal determinant (4.4) of a simplex's edges, in the order of its vertices: its normal, as long as its volume is large.
+fn simplex_normal<const D: usize>(corners: &[Vector<D>; D]) -> Vector<D> {
+    Vector::from_fn(|axis, _| {
+        // The formal determinant's first column holds the unit vectors.
+        let unit = Vector::from_fn(|r, _| if r == axis { 1.0 } else { 0.0 });
+        let columns = std::array::from_fn(|i| if i == 0 { unit } else { corners[i] - corners[0] });
+        laplace(&columns, false)
+    })
+}
+
 /// The unit normals by the formal determinants of the simplices' edges, in the order of their vertices; zero where there
 /// are none.
 fn normals<const D: usize>(tracer: &Tracer<D>) -> Vec<Vector<D>> {
@@ -84,12 +96,7 @@ fn normals<const D: usize>(tracer: &Tracer<D>) -> Vec<Vector<D>> {
     let mut sums = vec![Vector::<D>::zeros(); mesh.vertices.len()];
     for simplex in &mesh.simplices {
         let corners = simplex.map(|v| mesh.vertices[v as usize]);
-        let normal = Vector::from_fn(|axis, _| {
-            // The formal determinant's first column holds the unit vectors.
-            let unit = Vector::from_fn(|r, _| if r == axis { 1.0 } else { 0.0 });
-            let columns = std::array::from_fn(|i| if i == 0 { unit } else { corners[i] - corners[0] });
-            laplace(&columns, false)
-        });
+        let normal = simplex_normal(&corners);
         simplex.iter().for_each(|&v| sums[v as usize] += normal);
     }
     sums.iter().map(|sum| sum.try_normalize(0.0).unwrap_or_else(Vector::zeros)).collect()

@@ -1,7 +1,7 @@
 //! The generators of the occluders' cones: edges from the point p to the vertices it sees, each kept once.
 //!
 //! Two occluders that share a vertex share a generator, so that shared facets are known by their numbers and not by
-//! comparing coordinates. Generator 0 is the inverted normal -n, the last edge of every cone that belongs to a
+//! comparing coordinates. Generator 0 is the inverted normal -n (or -d, if p is approached from d), the last edge of every cone that belongs to a
 //! simplex containing p. Everything is a difference of two stored `f32` vectors, hence exact signs are to be had.
 
 use std::collections::HashMap;
@@ -53,7 +53,7 @@ pub(super) struct Generators<const D: usize> {
 }
 
 impl<const D: usize> Generators<D> {
-    pub fn new(point: Vector<D>, normal: Vector<D>) -> Self {
+    pub fn new(point: Vector<D>, normal: Vector<D>, approach: Vector<D>) -> Self {
         let mut generators = Self {
             point,
             normal,
@@ -62,7 +62,7 @@ impl<const D: usize> Generators<D> {
             vectors: Vec::new(),
             heights: Vec::new(),
         };
-        generators.push(Column::vector(-normal));
+        generators.push(Column::vector(-approach));
         generators
     }
 

@@ -7,7 +7,7 @@ use super::plane::Plane;
 use super::polygon::{Hole, Region};
 use super::span::Span;
 use super::trace::{SimplicialCone, Trace, facet_above_horizon, trace};
-use crate::geometry::{Vector, widen};
+use crate::geometry::{Dimension, Vector, widen};
 use crate::progress::{Cancelled, Progress, Silent};
 
 /// How much work one point may take.
@@ -102,11 +102,16 @@ impl<const D: usize> Hemisphere<D> {
     /// An empty hemisphere. `normal` need not be of unit length; it is used as given. `None` if it is zero or
     /// something is infinite or not a number.
     pub fn new(point: &Vector<D>, normal: &Vector<D>) -> Option<Self> {
-        let sound = is_finite(point) && is_finite(normal) && normal.iter().any(|&x| x != 0.0);
+        Self::approached(point, normal, normal)
+    }
+
+    /// The same over a point that is approached from another direction than the normal's: see [`Hemisphere::add_incident`].
+    pub fn approached(point: &Vector<D>, normal: &Vector<D>, approach: &Vector<D>) -> Option<Self> {
+        let sound = is_finite(point) && is_finite(normal) && is_finite(approach) && normal.iter().any(|&x| x != 0.0);
         sound.then(|| Self {
             point: *point,
             normal: *normal,
-            generators: Generators::new(*point, *normal),
+            generators: Generators::new(*point, *normal, *approach),
             cones: Vec::new(),
         })
     }
@@ -121,7 +126,7 @@ impl<const D: usize> Hemisphere<D> {
     }
 
     /// Adds a simplex that contains the point, given its D - 1 other vertices. It occludes the directions w for which
-    /// n + s w meets it for some s > 0: none on a convex surface, some in a concave fold. `None` if a coordinate is
+    /// n + s w, or d + s w if the point is approached from d, meets it for some s > 0: none on a convex surface, some in a concave fold. `None` if a coordinate is
     /// infinite or not a number.
     pub fn add_incident(&mut self, others: &[Vector<D>]) -> Option<()> {
         (others.len() == D - 1 && others.iter().all(is_finite)).then(|| {
@@ -210,7 +215,7 @@ impl<const D: usize> Hemisphere<D> {
             let outwards = -f64::from(facet.side) * plane.unit_normal();
             sum += outwards.dot(horizon.unit_normal()) * exposed(region, &mut holes, counter)?;
         }
-        let sphere = if D == 3 { 2.0 } else { 4.0 } * std::f64::consts::PI;
+        let sphere = Dimension::of::<D>().horizon_measure();
         Ok(sum / sphere)
     }
 

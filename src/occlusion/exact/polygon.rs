@@ -8,12 +8,22 @@
 //! as lying on it, which moves a boundary by no more than that, so each cut misplaces an area below 2 pi `ON_LINE`.
 
 use super::plane::Flat;
+use crate::geometry::Dimension;
 
 /// A distance (a sine) from a line below which a direction counts as lying on it: some roundings of unit vectors.
 pub(super) const ON_LINE: f64 = 2e-15;
 
 /// The cosine below which the angle between neighbouring corners counts as long.
 const LONG: f64 = -0.25;
+
+/// Whether the corners of a region are a ring: in 3D they are a chain, which has two ends.
+#[inline(always)]
+pub(super) const fn closes<const D: usize>() -> bool {
+    match Dimension::of::<D>() {
+        Dimension::Three => false,
+        Dimension::Four => true,
+    }
+}
 
 /// Whether the edge between two corners is so long that a corner is to be put on it.
 #[inline]
@@ -61,7 +71,7 @@ impl<const D: usize> Region<D> {
 
     /// Pairs of neighbouring corners, in order.
     fn edges(&self) -> impl Iterator<Item = (Flat, Flat)> + '_ {
-        let count = if D == 3 { self.corners.len() - 1 } else { self.corners.len() };
+        let count = self.corners.len() - usize::from(!closes::<D>());
         (0..count).map(|i| (self.corners[i], self.corners[(i + 1) % self.corners.len()]))
     }
 
@@ -72,7 +82,7 @@ impl<const D: usize> Region<D> {
 
     /// Whether this is nearly half of all directions, in 4D.
     pub fn is_nearly_half(&self) -> bool {
-        D > 3 && self.corners.len() > 3 && self.measure() > 1.5 * std::f64::consts::PI
+        closes::<D>() && self.corners.len() > 3 && self.measure() > 1.5 * std::f64::consts::PI
     }
 
     fn shorten_edges(&mut self) {
@@ -88,7 +98,7 @@ impl<const D: usize> Region<D> {
                 self.corners.push((a + b).normalize());
             }
         }
-        if D == 3 {
+        if !closes::<D>() {
             self.corners.push(last);
         }
     }
@@ -98,7 +108,7 @@ impl<const D: usize> Region<D> {
         if self.is_flat() {
             return 0.0;
         }
-        if D == 3 {
+        if !closes::<D>() {
             return self.edges().map(|(a, b)| a.cross(&b).norm().atan2(a.dot(&b))).sum();
         }
         let a = self.fan_centre();
@@ -126,12 +136,12 @@ impl<const D: usize> Region<D> {
 
     /// Vectors towards the inside of each bounding line, not of unit length: `v . x >= 0` for all x of the region.
     fn inward(&self) -> impl Iterator<Item = Flat> + '_ {
-        let ends = if D == 3 { 2 } else { 0 };
+        let ends = if closes::<D>() { 0 } else { 2 };
         let up = Flat::new(0.0, 0.0, 1.0);
         let arc = (0..ends).map(move |end| {
             if end == 0 { up.cross(&self.corners[0]) } else { -up.cross(&self.corners[self.corners.len() - 1]) }
         });
-        arc.chain(self.edges().filter(|_| D > 3).map(|(a, b)| a.cross(&b)))
+        arc.chain(self.edges().filter(|_| closes::<D>()).map(|(a, b)| a.cross(&b)))
     }
 
     /// Splits the region by the line `line . x = 0`, `line` of unit length: what is behind it, and what is before it.
@@ -161,7 +171,7 @@ impl<const D: usize> Region<D> {
                 before.push(corner);
             }
             let next = (i + 1) % count;
-            if (D > 3 || next > 0) && distance * distances[next] < 0.0 {
+            if (closes::<D>() || next > 0) && distance * distances[next] < 0.0 {
                 let crossing = (corner * distances[next].abs() + self.corners[next] * distance.abs()).normalize();
                 behind.push(crossing);
                 before.push(crossing);
@@ -209,7 +219,7 @@ impl<const D: usize> Hole<D> {
     /// Three corners nearly on a line would give their short edges directions at random, by which the hole could lose
     /// much more than it gains from them: the middle one is left out, at the cost of a triangle of area below 1e-15.
     pub fn new(mut corners: Vec<Flat>) -> Option<Self> {
-        if D > 3 {
+        if closes::<D>() {
             let mut at = 0;
             while at < corners.len() && corners.len() > 2 {
                 let count = corners.len();
@@ -275,11 +285,11 @@ mod tests {
     use std::f64::consts::PI;
 
     fn sphere<const D: usize>() -> f64 {
-        if D == 3 { 2.0 * PI } else { 4.0 * PI }
+        Dimension::of::<D>().horizon_measure()
     }
 
     fn orthants<const D: usize>() {
-        let line = Flat::new(0.48, 0.6, if D == 3 { 0.0 } else { 0.64 }).normalize();
+        let line = Flat::new(0.48, 0.6, Dimension::of::<D>().pick(0.0, 0.64)).normalize();
         let (mut whole, mut behind, mut before) = (0.0, 0.0, 0.0);
         for orthant in Region::<D>::whole() {
             assert!((orthant.measure() - sphere::<D>() / f64::from(1 << (D - 1))).abs() < 1e-15);

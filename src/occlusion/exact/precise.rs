@@ -6,7 +6,7 @@
 //! power of two, it is computed in 128-bit integers. Only what is left goes to expansions, which are some hundred
 //! times slower.
 
-use crate::geometry::{Column, Expansion, Vector64, two_product, two_sum};
+use crate::geometry::{Column, Expansion, Vector64, WideInteger, cofactors, two_product, two_sum};
 
 /// Rounding of a sum of products of D pairs' numbers, relative to the product of the columns' 1-norms. Each operation
 /// rounds by less than 2^-103 of its result; a D x D determinant has fewer than 2^6 of them on any path of additions.
@@ -82,38 +82,7 @@ pub(super) fn dot_pairs<const D: usize>(a: &[Pair; D], b: &[Pair; D]) -> Pair {
 
 /// The generalised cross product of the first D - 1 vectors, as [`crate::geometry::cross`].
 pub(super) fn cross_pairs<const D: usize>(columns: &[[Pair; D]; D]) -> [Pair; D] {
-    cross_of(columns, Pair::times, Pair::plus, Pair::minus)
-}
-
-/// The cross product over any numbers: cofactors of a first column that is left open.
-#[inline]
-fn cross_of<T: Copy, const D: usize>(
-    columns: &[[T; D]; D],
-    times: impl Fn(T, T) -> T + Copy,
-    plus: impl Fn(T, T) -> T + Copy,
-    minus: impl Fn(T, T) -> T + Copy,
-) -> [T; D] {
-    let minor = |a: usize, b: usize, i: usize, j: usize| {
-        minus(times(columns[a][i], columns[b][j]), times(columns[a][j], columns[b][i]))
-    };
-    std::array::from_fn(|skip| {
-        // The rows left, in order, with the first two exchanged where the cofactor's sign is negative.
-        let mut rows = [0; D];
-        for (place, row) in (0..D).filter(|&row| row != skip).enumerate() {
-            rows[place] = row;
-        }
-        if skip % 2 == 1 {
-            rows.swap(0, 1);
-        }
-        if D == 3 {
-            return minor(0, 1, rows[0], rows[1]);
-        }
-        let (i, j, k) = (rows[0], rows[1], rows[2]);
-        let first = times(columns[0][i], minor(1, 2, j, k));
-        let second = times(columns[0][j], minor(1, 2, i, k));
-        let third = times(columns[0][k], minor(1, 2, i, j));
-        plus(minus(first, second), third)
-    })
+    cofactors(columns, Pair::times, Pair::plus, Pair::minus)
 }
 
 /// The determinant of the columns, exact up to the last rounding, if they are integers times powers of two with few
@@ -143,10 +112,7 @@ pub(super) fn integer_determinant<const D: usize>(columns: &[Column<D>; D]) -> O
     if bits + 5 > 126 {
         return None;
     }
-    integers.rotate_left(1);
-    let normal = cross_of(&integers, |a, b| a * b, |a, b| a + b, |a, b| a - b);
-    let determinant: i128 = (0..D).map(|r| normal[r] * integers[D - 1][r]).sum();
-    Some(determinant as f64 * power_of_two(exponent)?)
+    Some(WideInteger::determinant(&integers).low_128() as f64 * power_of_two(exponent)?)
 }
 
 /// The exponent of the lowest bit set in a double that is neither zero nor subnormal.

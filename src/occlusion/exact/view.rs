@@ -7,6 +7,7 @@ use super::exposed::LOOK;
 use super::hemisphere::{Budget, Hemisphere, Stopped};
 use crate::accel::{Bvh, Tracer};
 use crate::geometry::{Aabb, Vector};
+use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
 use crate::trace::ShadingPoint;
 
@@ -59,7 +60,13 @@ fn view<const D: usize>(
 ) -> Result<Option<Hemisphere<D>>, Cancelled> {
     let mesh = tracer.mesh();
     let (position, normal) = (point.position(mesh), point.normal(mesh));
-    let Some(mut hemisphere) = Hemisphere::new(&position, &normal) else { return Ok(None) };
+    let approach = match *point {
+        ShadingPoint::Vertex(vertex) => {
+            approach(mesh, tracer.incidence().around(mesh.identity[vertex as usize]), vertex)
+        }
+        ShadingPoint::Inside { .. } => normal,
+    };
+    let Some(mut hemisphere) = Hemisphere::approached(&position, &normal, &approach) else { return Ok(None) };
     // The coordinates of a mesh are finite, so nothing is refused below.
     let own: &[u32] = match point {
         ShadingPoint::Vertex(vertex) => {

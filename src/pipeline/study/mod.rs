@@ -2,18 +2,18 @@
 //!
 //! What is measured, each in a file of its own:
 //!
-//! - [`ladder`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A rung is repeated with other
-//!   seeds until it has traced [`ladder::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
+//! - [`convergence`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A level is repeated with other
+//!   seeds until it has traced [`convergence::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
 //! - [`pictures`]: what becomes of the values in an image: `flat` and `smooth` shading against the value of each visible
 //!   point itself;
 //! - [`precision`]: on how many rays plain Cramer's rule, in `f32` and in `f64`, says something else than exact signs; and
-//!   what each slip of the published algorithm does to its values.
+//!   what each deviation of the published algorithm does to its values.
 //!
 //! All is about the vertices or voxels of one scene: that of the pipeline's first `occlusion`. Of a large one some are
 //! taken, evenly spread. How much is computed is bounded by counts, never by the clock, so that the same pipeline gives the
 //! same errors everywhere; only times differ.
 
-mod ladder;
+mod convergence;
 mod pictures;
 mod plot;
 mod precision;
@@ -22,16 +22,21 @@ mod tables;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::build::AnyMesh;
-use super::files::write_whole;
-use super::plan::{OcclusionSource, grouped};
-use super::{Invalid, Pipeline, RunError, Settings};
+use super::lock::Lock;
+use super::{Pipeline, RunError, Settings};
 use crate::accel::Tracer;
 use crate::mesh::Mesh;
 use crate::progress::Progress;
-use ladder::{Bench, Rung, Truth};
+use crate::stages::Invalid;
+use crate::stages::Ref;
+use crate::stages::describe::grouped;
+use crate::stages::occlusion::{OcclusionPlan, OcclusionSource};
+use crate::stages::render::RenderPlan;
+use crate::stages::scene::{AnyMesh, ScenePlan};
+use crate::stages::write::write_whole;
+use convergence::{Bench, Level, Truth};
 use pictures::Pictures;
-use precision::{Differing, SlipEffect};
+use precision::{DeviationEffect, Differing};
 
 /// What a study found.
 #[derive(Clone, Debug)]
@@ -45,8 +50,8 @@ pub struct Study {
     threads: usize,
     seed: u64,
     truth: Truth,
-    rungs: Vec<Rung>,
-    slips: Vec<SlipEffect>,
+    levels: Vec<Level>,
+    deviations: Vec<DeviationEffect>,
     differing: Vec<Differing>,
     pictures: Option<Pictures>,
     notes: Vec<String>,
@@ -66,20 +71,19 @@ impl Study {
 /// # Errors
 /// [`RunError::Refused`] if there is no occlusion, or nothing in its scene; else as [`super::run`].
 pub fn study(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Study, RunError> {
-    let threads = settings.threads.map_or(0, std::num::NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    pool.install(|| study_here(pipeline, progress))
+    settings.pool()?.install(|| study_here(pipeline, progress))
 }
 
 fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, RunError> {
     let plan = &pipeline.plan;
     let refuse = |path: &str, message: &str| RunError::Refused(pipeline.document.refuse(Invalid::new(path, message)));
-    let Some(occlusion) = plan.occlusions.first() else {
+    let Some((stage, occlusion)) = plan.all::<OcclusionPlan>().next() else {
         return Err(refuse("stages", "there is no `occlusion` to study; add one after the scene"));
     };
-    progress.begin("scene", 0);
-    let prepared = pipeline.prepare(|scene| scene == occlusion.scene);
-    progress.end();
+    let _lock = Lock::take(&plan.out)?;
+    let running = progress.stage("scene", 0);
+    let prepared = pipeline.prepare(|stage| stage == occlusion.scene.index());
+    running.end();
     let mut notes = Vec::new();
     let mut seed = plan.seed;
     if let OcclusionSource::Compute(computation) = &occlusion.source {
@@ -88,11 +92,14 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
             notes.push("`max_distance` is left out: all methods count occluders at any distance.".to_owned());
         }
     }
-    if plan.occlusions.len() > 1 {
-        notes.push(format!("The pipeline has several occlusions; this is the scene of the first, `{}`.", occlusion.id));
+    if plan.all::<OcclusionPlan>().count() > 1 {
+        notes.push(format!(
+            "The pipeline has several occlusions; this is the scene of the first, `{}`.",
+            plan.id(stage)
+        ));
     }
-    let empty = || refuse(&plan.scenes[occlusion.scene].path, "the scene is empty: there is no occlusion to study");
-    let mut study = match prepared?.meshes.swap_remove(occlusion.scene) {
+    let empty = || refuse(plan.path(occlusion.scene), "the scene is empty: there is no occlusion to study");
+    let mut study = match prepared?.meshes.swap_remove(occlusion.scene.nth()) {
         Some(AnyMesh::Three(mesh)) => of_mesh(pipeline, mesh, occlusion.scene, seed, progress)?,
         Some(AnyMesh::Four(mesh)) => of_mesh(pipeline, mesh, occlusion.scene, seed, progress)?,
         None => None,
@@ -112,7 +119,7 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
 fn of_mesh<const D: usize>(
     pipeline: &Pipeline,
     mesh: Mesh<D>,
-    scene: usize,
+    scene: Ref<ScenePlan>,
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Option<Study>, RunError> {
@@ -121,14 +128,17 @@ fn of_mesh<const D: usize>(
     let mesh = tracer.mesh();
     let Some(bench) = Bench::new(Arc::clone(&tracer), seed) else { return Ok(None) };
     let truth = bench.truth(progress)?;
-    let mut rungs = Vec::new();
-    for contender in ladder::CONTENDERS {
-        rungs.extend(bench.climb(contender, &truth, progress)?);
+    let mut levels = Vec::new();
+    for config in convergence::CONFIGS {
+        levels.extend(bench.converge(config, &truth, progress)?);
     }
-    let slips = precision::slips(&bench, &truth, progress)?;
+    let deviations = precision::deviations(&bench, &truth, progress)?;
     let differing = precision::differing(&tracer, seed, progress)?;
-    let render = pipeline.plan.renders.iter().find(|r| r.scene == scene && r.occlusion.is_some());
-    let pictures = render.map(|render| pictures::measure(&tracer, render, seed, progress)).transpose()?.flatten();
+    let render = pipeline.plan.all::<RenderPlan>().find(|(_, r)| r.scene == scene && r.occlusion.is_some());
+    let pictures = render
+        .map(|(stage, render)| pictures::measure(&tracer, pipeline.plan.id(stage), render, seed, progress))
+        .transpose()?
+        .flatten();
     Ok(Some(Study {
         name: pipeline.plan.name.clone(),
         dimension: D,
@@ -137,8 +147,8 @@ fn of_mesh<const D: usize>(
         threads: rayon::current_num_threads(),
         seed,
         truth,
-        rungs,
-        slips,
+        levels,
+        deviations,
         differing,
         pictures,
         notes: Vec::new(),

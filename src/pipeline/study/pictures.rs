@@ -11,10 +11,10 @@ use crate::accel::Tracer;
 use crate::occlusion::exact::Budget;
 use crate::occlusion::{Error, Estimator};
 use crate::pipeline::RunError;
-use crate::pipeline::build::camera;
-use crate::pipeline::plan::RenderPlan;
 use crate::progress::Progress;
 use crate::render::{Aov, Renderer, Shading};
+use crate::stages::camera::camera;
+use crate::stages::render::RenderPlan;
 use crate::trace::cpu::CpuBackend;
 use crate::trace::{RayBackend, Sampling, ShadingPoint};
 use crate::volume::{Array, Values};
@@ -61,6 +61,7 @@ fn reduced(dimensions: [usize; 3]) -> [usize; 3] {
 /// Measures; none if no voxel sees anything.
 pub fn measure<const D: usize>(
     tracer: &Arc<Tracer<D>>,
+    id: &str,
     render: &RenderPlan,
     seed: u64,
     progress: &dyn Progress,
@@ -78,7 +79,7 @@ pub fn measure<const D: usize>(
     let by_rays = |samples| Estimator::Sampled(Sampling::new(samples, seed));
     let vertex_samples = [16, 64, 256, 1024];
     let voxel_samples = [16, 64, 256];
-    progress.begin("study: pictures", (2 * vertex_samples.len() + voxel_samples.len() + 1) as u64);
+    let _running = progress.stage("study: pictures", (2 * vertex_samples.len() + voxel_samples.len() + 1) as u64);
     let small = tracer.mesh().simplices.len() <= EXACT_UP_TO;
     let (reference, name) = match small.then(|| image(Shading::Voxel(Estimator::Exact(BUDGET)))) {
         Some(Ok(arrays)) => (arrays, "exact at each visible point".to_owned()),
@@ -117,8 +118,7 @@ pub fn measure<const D: usize>(
         let (arrays, seconds) = timed(|| image(Shading::Voxel(by_rays(samples))))?;
         add("voxel", samples, seconds, &arrays);
     }
-    progress.end();
-    let pictures = Pictures { render: render.id.clone(), dimensions, seen: seen.len(), reference: name, rows };
+    let pictures = Pictures { render: id.to_owned(), dimensions, seen: seen.len(), reference: name, rows };
     Ok((pictures.seen > 0).then_some(pictures))
 }
 

@@ -8,6 +8,7 @@ use std::fmt::Write;
 
 use super::Study;
 use super::tables::duration;
+use crate::text::for_xml;
 
 const WIDTH: f64 = 430.0;
 const HEIGHT: f64 = 400.0;
@@ -78,19 +79,19 @@ fn lines(points: impl Iterator<Item = (&'static str, [f64; 2])>) -> Vec<Line> {
 
 /// The whole picture.
 pub(super) fn svg(study: &Study) -> String {
-    let rungs = || study.rungs.iter();
+    let levels = || study.levels.iter();
     let mut panels = vec![
         Panel {
             title: "RMS error against rays",
             across: ("rays a vertex", Ticks::Rays),
-            lines: lines(rungs().map(|r| (r.method, [f64::from(r.samples), r.errors.rms]))),
+            lines: lines(levels().map(|r| (r.method, [f64::from(r.samples), r.errors.rms]))),
             slope: Some("random"),
             upright: None,
         },
         Panel {
             title: "RMS error against time",
             across: ("time a vertex, on one thread", Ticks::Time),
-            lines: lines(rungs().map(|r| (r.method, [r.seconds, r.errors.rms]))),
+            lines: lines(levels().map(|r| (r.method, [r.seconds, r.errors.rms]))),
             slope: Some("random"),
             upright: study.truth.seconds.map(|s| (s, "exact")),
         },
@@ -112,7 +113,7 @@ pub(super) fn svg(study: &Study) -> String {
          <text x='{}' y='28' font-size='17' font-weight='bold'>{}<tspan font-weight='normal' fill='#666' dx='12' \
          font-size='13'>{}D, {} vertices, {} simplices</tspan></text>\n",
         MARGIN[0],
-        study.name.replace('&', "&amp;").replace('<', "&lt;"),
+        for_xml(&study.name),
         study.dimension,
         super::grouped(study.vertices as u64),
         super::grouped(study.simplices as u64),

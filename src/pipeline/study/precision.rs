@@ -1,24 +1,24 @@
-//! Where rounding decides: the slips of the published algorithm, and plain Cramer's rule on rays that are hard to tell.
+//! Where rounding decides: the deviations of the published algorithm, and plain Cramer's rule on rays that are hard to tell.
 
 use rayon::prelude::*;
 
 use super::Errors;
-use super::ladder::{Bench, Truth};
+use super::convergence::{Bench, Truth};
 use crate::accel::Tracer;
-use crate::geometry::{Aabb, Ray, Vector, Vector64, narrow, widen};
+use crate::geometry::{Aabb, Dimension, Ray, Vector, Vector64, narrow, widen};
 use crate::occlusion::{Cancelled, Deviations, plain_cramer};
 use crate::pipeline::RunError;
 use crate::progress::Progress;
 use crate::trace::{Sampler, Sequence};
 
-/// Rays a vertex for the slips.
+/// Rays a vertex for the deviations.
 const SAMPLES: u32 = 1024;
 /// Rays of each kind that are held against exact signs.
 pub const RAYS: usize = 50_000;
 
-/// What the published algorithm gives with some of its slips.
+/// What the published algorithm gives with some of its deviations.
 #[derive(Clone, Debug)]
-pub struct SlipEffect {
+pub struct DeviationEffect {
     pub what: &'static str,
     /// Least, mean and largest occlusion: 1 - A.
     pub least: f64,
@@ -27,12 +27,12 @@ pub struct SlipEffect {
     pub errors: Errors,
 }
 
-/// The slips one by one.
-pub fn slips<const D: usize>(
+/// The deviations one by one.
+pub fn deviations<const D: usize>(
     bench: &Bench<D>,
     truth: &Truth,
     progress: &dyn Progress,
-) -> Result<Vec<SlipEffect>, RunError> {
+) -> Result<Vec<DeviationEffect>, RunError> {
     let published = Deviations::PUBLISHED;
     let variants = [
         ("as published", published),
@@ -44,14 +44,15 @@ pub fn slips<const D: usize>(
         ("all of these", Deviations::NONE),
         ("equations as printed", Deviations { printed_equations: true, ..published }),
     ];
-    progress.begin("study: slips", variants.len() as u64);
-    let found = variants.into_iter().map(|(what, slips)| {
+    let _running = progress.stage("study: deviations", variants.len() as u64);
+    let found = variants.into_iter().map(|(what, deviations)| {
         if progress.cancelled() {
             return Err(Cancelled.into());
         }
-        let values: Vec<f64> = bench.with_deviations(slips, SAMPLES, progress)?.into_iter().map(f64::from).collect();
+        let values: Vec<f64> =
+            bench.with_deviations(deviations, SAMPLES, progress)?.into_iter().map(f64::from).collect();
         progress.advance(1);
-        Ok(SlipEffect {
+        Ok(DeviationEffect {
             what,
             least: 1.0 - values.iter().copied().fold(0.0, f64::max),
             mean: 1.0 - values.iter().sum::<f64>() / values.len() as f64,
@@ -60,7 +61,6 @@ pub fn slips<const D: usize>(
         })
     });
     let found = found.collect();
-    progress.end();
     found
 }
 
@@ -80,13 +80,12 @@ pub fn differing<const D: usize>(
     seed: u64,
     progress: &dyn Progress,
 ) -> Result<Vec<Differing>, RunError> {
-    let aims: &[(&str, usize)] = if D == 4 {
-        &[("inside tetrahedra", 0), ("on triangles", 3), ("on edges", 2), ("at vertices", 1)]
-    } else {
-        &[("inside triangles", 0), ("on edges", 2), ("at vertices", 1)]
+    let aims: &[(&str, usize)] = match Dimension::of::<D>() {
+        Dimension::Three => &[("inside triangles", 0), ("on edges", 2), ("at vertices", 1)],
+        Dimension::Four => &[("inside tetrahedra", 0), ("on triangles", 3), ("on edges", 2), ("at vertices", 1)],
     };
     let bounds = tracer.mesh().bounds();
-    progress.begin("study: precision", (aims.len() * RAYS) as u64);
+    let _running = progress.stage("study: precision", (aims.len() * RAYS) as u64);
     let found = aims.iter().enumerate().map(|(number, &(aim, corners))| {
         if progress.cancelled() {
             return Err(Cancelled.into());
@@ -99,7 +98,6 @@ pub fn differing<const D: usize>(
         Ok(Differing { aim, hit, single, double })
     });
     let found = found.collect();
-    progress.end();
     found
 }
 

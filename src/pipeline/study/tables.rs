@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use super::{Errors, Study, counted};
-use crate::pipeline::files::PROGRAM;
-use crate::pipeline::plan::grouped;
+use crate::stages::describe::grouped;
+use crate::stages::write::PROGRAM;
+use crate::text::for_markdown;
 
 /// One row a measurement. Occlusion: seconds are those of one vertex on one thread. Image: those of the whole image, values
 /// and all, on all threads.
@@ -20,7 +21,7 @@ pub(super) fn csv(study: &Study) -> String {
             "{kind},{method},{samples},{repetitions},{rms:.6e},{maximum:.6e},{bias:.6e},{seconds:.4e},{rate}"
         );
     };
-    for r in &study.rungs {
+    for r in &study.levels {
         let rate = format!("{:.4e}", r.rays_per_second);
         row("occlusion", r.method, r.samples, r.repetitions, &r.errors, r.seconds, &rate);
     }
@@ -49,7 +50,7 @@ pub(super) fn markdown(study: &Study) -> String {
     };
     let looked_at = study.truth.values.len();
     let rest = if looked_at < study.vertices { format!(", of which {looked_at} are looked at") } else { String::new() };
-    line(format_args!("# Error against time: {}\n", study.name));
+    line(format_args!("# Error against time: {}\n", for_markdown(&study.name)));
     line(format_args!(
         "{}D, {}{rest}, {}. Seed {}, {}, {PROGRAM}.",
         study.dimension,
@@ -78,7 +79,7 @@ pub(super) fn markdown(study: &Study) -> String {
     ));
     line(format_args!("| method | rays | RMS error | largest | bias | time | rays a second |"));
     line(format_args!("| --- | ---: | ---: | ---: | ---: | ---: | ---: |"));
-    for r in &study.rungs {
+    for r in &study.levels {
         let Errors { rms, maximum, bias } = r.errors;
         line(format_args!(
             "| {} | {} | {rms:.5} | {maximum:.4} | {bias:+.5} | {} | {:.2} million |",
@@ -117,7 +118,7 @@ pub(super) fn markdown(study: &Study) -> String {
     let truth = &study.truth.values;
     let (low, high) = truth.iter().fold((1.0f64, 0.0f64), |(low, high), &a| (low.min(1.0 - a), high.max(1.0 - a)));
     let mean = 1.0 - truth.iter().sum::<f64>() / looked_at.max(1) as f64;
-    for s in &study.slips {
+    for s in &study.deviations {
         line(format_args!("| {} | {:.3} | {:.3} | {:.3} | {:.4} |", s.what, s.least, s.mean, s.most, s.errors.rms));
     }
     line(format_args!("| exact | {low:.3} | {mean:.3} | {high:.3} | |"));

@@ -11,6 +11,7 @@ use serde::de::{self, DeserializeSeed, Deserializer, IntoDeserializer, Visitor};
 use serde::forward_to_deserialize_any;
 
 use super::{Entry, Node, Problem, Segment, Value, describe};
+use crate::text::number;
 
 /// Reads a structure out of a tree.
 pub fn decode<'de, T: de::Deserialize<'de>>(node: &'de Node) -> Result<T, Problem> {
@@ -48,6 +49,24 @@ impl<'de> Decoder<'de> {
         }
     }
 }
+
+/// Where a whole number is wanted, `1e3` and `007` are whole numbers too.
+macro_rules! whole {
+    ($($name:ident)*) => {$(
+        fn $name<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Problem> {
+            match self.0.value {
+                Value::Float(x) if x.is_finite() && x.fract() == 0.0 => match x.abs() < EXACT {
+                    true => visitor.visit_i64(x as i64).map_err(|p: Problem| p.or_at(self.0.origin)),
+                    false => self.refuse(format!("the number {} is too large", number(x))),
+                },
+                _ => self.deserialize_any(visitor),
+            }
+        }
+    )*};
+}
+
+/// Up to here every whole number has a double of its own.
+const EXACT: f64 = (1u64 << 53) as f64;
 
 impl<'de> Deserializer<'de> for Decoder<'de> {
     type Error = Problem;
@@ -125,9 +144,13 @@ impl<'de> Deserializer<'de> for Decoder<'de> {
         visitor.visit_enum(choice).map_err(|p| p.or_at(self.0.origin))
     }
 
+    whole! {
+        deserialize_i8 deserialize_i16 deserialize_i32 deserialize_i64
+        deserialize_u8 deserialize_u16 deserialize_u32 deserialize_u64
+    }
+
     forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 char bytes byte_buf unit unit_struct seq tuple tuple_struct map
-        identifier ignored_any
+        bool i128 u128 char bytes byte_buf unit unit_struct seq tuple tuple_struct map identifier ignored_any
     }
 }
 
@@ -277,9 +300,11 @@ mod tests {
 
     #[test]
     fn reads() {
-        let tree = parse("name: x\nsizes: [1, 2]\nshape: {box: {edge: 3}}\nscale: 100000000000000000000\n").unwrap();
+        let tree =
+            parse("name: x\nsizes: [1, 2, 3.0, 1e3, 007]\nshape: {box: {edge: 3}}\nscale: 100000000000000000000\n")
+                .unwrap();
         let top: Top = decode(&tree).unwrap();
-        assert_eq!((top.name.as_str(), top.sizes), ("x", vec![1, 2]));
+        assert_eq!((top.name.as_str(), top.sizes), ("x", vec![1, 2, 3, 1000, 7]));
         assert!(matches!(top.shape, Some(Shape::Box { edge: 3.0 })) && top.scale == Some(1e20));
         assert!(matches!(decode::<Top>(&parse("{name: x, shape: round}").unwrap()).unwrap().shape, Some(Shape::Round)));
     }

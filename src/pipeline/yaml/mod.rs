@@ -6,19 +6,21 @@
 //! the command line edit that tree, and mark what they touched. `decode` turns the tree into `serde` structures,
 //! and any later check can ask the [`Document`](super::Document) where a path such as `stages[1].render.dimensions` is.
 //!
-//! The parser below is `saphyr-parser`, used at its event level: duplicate keys, aliases, depth and number of documents are decided here.
+//! Parsing is left to `serde_saphyr`, which tells where each value stands. It can't do the rest: it decodes text only, so
+//! there is no tree that overrides could edit; it decodes on the way, so a path and its place are gone when
+//! a later check wants to cite them; and its errors carry no path.
 
 mod decode;
 mod parse;
 mod path;
 mod problem;
-mod scalar;
 
 pub(super) use decode::decode;
 pub(super) use parse::parse;
 pub(super) use path::{Segment, parse_path, show_path};
 pub(super) use problem::Problem;
-pub(super) use scalar::resolve_plain;
+
+use crate::text::number;
 
 /// Lists and mappings deeper than this are refused: no pipeline needs them, and the stack stays small.
 pub(super) const MAX_DEPTH: usize = 64;
@@ -53,7 +55,7 @@ pub(super) enum Value {
     Null,
     /// `true` or `false`.
     Bool(bool),
-    /// A whole number, decimal, `0x` or `0o`.
+    /// A whole number within 64 bits.
     Integer(i128),
     /// Any other number, `.inf` and `.nan` included.
     Float(f64),
@@ -115,19 +117,6 @@ impl Node {
             _ => {}
         }
     }
-
-    /// The number of nodes in the subtree, and how deep it is.
-    pub fn size(&self) -> (usize, usize) {
-        let fold = |(count, depth): (usize, usize), node: &Node| {
-            let (c, d) = node.size();
-            (count + c, depth.max(d + 1))
-        };
-        match &self.value {
-            Value::List(items) => items.iter().fold((1, 0), fold),
-            Value::Map(entries) => entries.iter().map(|e| &e.value).fold((1, 0), fold),
-            _ => (1, 0),
-        }
-    }
 }
 
 /// How a value is called in a message.
@@ -136,7 +125,7 @@ pub(super) fn describe(value: &Value) -> String {
         Value::Null => "nothing".into(),
         Value::Bool(b) => format!("`{b}`"),
         Value::Integer(i) => format!("the number {i}"),
-        Value::Float(x) => format!("the number {x:?}"),
+        Value::Float(x) => format!("the number {}", number(*x)),
         Value::Text(text) => format!("the text \"{}\"", shorten(text)),
         Value::List(items) if items.is_empty() => "an empty list".into(),
         Value::List(items) => format!("a list of {}", items.len()),

@@ -1,40 +1,149 @@
-//! From text to a tree of located nodes.
+//! From text to a tree of located nodes, by the `serde_saphyr` crate.
 //!
-//! The parser sends events (a mapping starts, a scalar, ...); a stack of open collections turns them into nodes. The
-//! limits are here, because text can be small and its tree vast: depth is bounded, aliases (`*name`) copy what they
-//! name only up to a total (ten lines of nested aliases could ask for 10^9 nodes), one file holds one document, and
-//! keys are plain words that stand once.
+//! It parses, tells numbers from text, follows aliases, keeps limits, and says where each value stands
+//! ([`Spanned`]). What is decided here: which of its limits hold, that keys stand once (with both lines
+//! told), and how its complaints are worded.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+use std::fmt;
 
-use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span, Tag};
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_saphyr::budget::BudgetBreach;
+use serde_saphyr::options::{DuplicateKeyPolicy, MergeKeyPolicy, NonFiniteFloatPolicy};
+use serde_saphyr::{DefaultMessageFormatter, Error, Location, MessageFormatter, Spanned};
 
-use super::{Entry, MAX_DEPTH, Node, Origin, Segment, Value, describe, resolve_plain, shorten};
-use crate::pipeline::yaml::problem::Problem;
+use super::{Entry, MAX_DEPTH, Node, Origin, Problem, Segment, Value, shorten};
 
-/// All aliases of a file together may copy this many nodes.
-const MAX_COPIED: usize = 1_000_000;
+/// All aliases of a file together may copy this many values.
+const MAX_COPIED: usize = 200_000;
 
 /// The tree of a text's only document.
 pub fn parse(text: &str) -> Result<Node, Problem> {
-    // The mark that some editors put first is no part of the text.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if let Some((place, c)) = position_of(text, |c| c.is_control() && !matches!(c, '\n' | '\r' | '\t' | '\u{85}')) {
         let message = format!("the character U+{:04X} can't stand in YAML; is this a text file?", u32::from(c));
         return Err(Problem::new(message).or_at(place));
     }
-    let mut builder = Builder::default();
-    for step in Parser::new_from_str(text) {
-        let (event, span) = step.map_err(|e| syntax(text, &e))?;
-        builder.take(event, origin(&span))?;
-    }
-    builder.root.ok_or_else(|| Problem::new("is empty; a pipeline is a mapping with `name` and `stages`").or_at(START))
+    let options = serde_saphyr::options! {
+        // The size of a file is bounded before, and its tree is in proportion to it, but for aliases.
+        budget: serde_saphyr::budget! {
+            max_depth: MAX_DEPTH,
+            flow_nesting_limit: MAX_DEPTH,
+            max_events: usize::MAX,
+            max_nodes: usize::MAX,
+            max_total_scalar_bytes: usize::MAX,
+            max_recorded_anchor_events: MAX_COPIED,
+            enforce_alias_anchor_ratio: false,
+        },
+        alias_limits: serde_saphyr::alias_limits! { max_total_replayed_events: MAX_COPIED },
+        // The tree keeps both, so that the complaint can name both lines.
+        duplicate_keys: DuplicateKeyPolicy::PassThrough,
+        merge_keys: MergeKeyPolicy::AsOrdinary,
+        // Whoever wants a number refuses those that are not finite.
+        non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
+        null_as_string: true,
+        strict_booleans: true,
+        reject_unsupported_tags: true,
+        underscored_numbers_as_strings: true,
+        with_snippet: false,
+    };
+    let root: Node = serde_saphyr::from_str_with_options(text, options).map_err(|e| refusal(text, &e))?;
+    keys_stand_once(&root)?;
+    Ok(root)
 }
 
-const START: Origin = Origin::File { line: 1, column: 1 };
+fn origin(location: Location) -> Origin {
+    Origin::File { line: counted(location.line()), column: counted(location.column()) }
+}
 
-fn origin(span: &Span) -> Origin {
-    Origin::File { line: span.start.line().max(1), column: span.start.col() + 1 }
+fn counted(n: u64) -> usize {
+    usize::try_from(n).unwrap_or(usize::MAX).max(1)
+}
+
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // Of an alias, what it names: that is where a wrong value must be mended.
+        let Spanned { value, defined, .. } = Spanned::deserialize(deserializer)?;
+        Ok(Node { origin: origin(defined), value })
+    }
+}
+
+impl<'de> Deserialize<'de> for Value {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(AnyValue)
+    }
+}
+
+struct AnyValue;
+
+impl<'de> Visitor<'de> for AnyValue {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, b: bool) -> Result<Value, E> {
+        Ok(Value::Bool(b))
+    }
+
+    fn visit_i64<E>(self, i: i64) -> Result<Value, E> {
+        Ok(Value::Integer(i.into()))
+    }
+
+    fn visit_u64<E>(self, i: u64) -> Result<Value, E> {
+        Ok(Value::Integer(i.into()))
+    }
+
+    fn visit_f64<E>(self, x: f64) -> Result<Value, E> {
+        Ok(Value::Float(x))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(Value::Text(text.to_owned()))
+    }
+
+    fn visit_string<E>(self, text: String) -> Result<Value, E> {
+        Ok(Value::Text(text))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let mut items = Vec::new();
+        while let Some(item) = access.next_element()? {
+            items.push(item);
+        }
+        Ok(Value::List(items))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let mut entries = Vec::new();
+        while let Some((key, value)) = access.next_entry::<Spanned<String>, Node>()? {
+            entries.push(Entry { key: key.value, origin: origin(key.defined), value });
+        }
+        Ok(Value::Map(entries))
+    }
+}
+
+/// Refuses a mapping in which a key stands twice. Recursion is bounded by [`MAX_DEPTH`].
+fn keys_stand_once(node: &Node) -> Result<(), Problem> {
+    let Value::Map(entries) = &node.value else {
+        let items = node.items().iter().enumerate();
+        return items
+            .into_iter()
+            .try_for_each(|(i, item)| keys_stand_once(item).map_err(|problem| problem.inside(Segment::Index(i))));
+    };
+    let mut seen = BTreeMap::new();
+    for Entry { key, origin, value } in entries {
+        if let Some(Origin::File { line, .. }) = seen.insert(key, *origin) {
+            let message = format!("the key `{}` stands twice; it stands on line {line} already", shorten(key));
+            return Err(Problem::new(message).or_at(*origin));
+        }
+        keys_stand_once(value).map_err(|problem| problem.inside(Segment::Key(key.clone())))?;
+    }
+    Ok(())
 }
 
 /// The first character that fits, and where it is.
@@ -46,210 +155,47 @@ fn position_of(text: &str, fits: impl Fn(char) -> bool) -> Option<(Origin, char)
     text[at..].chars().next().map(|c| (place, c))
 }
 
-/// The parser's refusal, with a hint where its words would puzzle.
-fn syntax(text: &str, error: &ScanError) -> Problem {
-    let (line, column) = (error.marker().line().max(1), error.marker().col() + 1);
+/// The crate's complaint, in our words where its own would puzzle.
+fn refusal(text: &str, error: &Error) -> Problem {
+    let error = match error {
+        Error::AliasError { error, .. } => error,
+        error => error,
+    };
+    let (line, column) = error.location().map_or((1, 1), |place| (counted(place.line()), counted(place.column())));
+    let at = |line, column, message: String| Problem::new(message).or_at(Origin::File { line, column });
     let indent_with_tab = |l: &str| l.trim_start_matches(' ').starts_with('\t') && !l.trim().is_empty();
     let tab = text.lines().enumerate().skip(line.saturating_sub(2)).take(2).find(|(_, l)| indent_with_tab(l));
     if let Some((n, l)) = tab {
         let column = l.find('\t').map_or(1, |spaces| spaces + 1);
-        let message = "is not YAML: a tab indents this line; YAML wants spaces";
-        return Problem::new(message).or_at(Origin::File { line: n + 1, column });
+        return at(n + 1, column, "is not YAML: a tab indents this line; YAML wants spaces".into());
     }
-    Problem::new(format!("is not YAML: {}", error.info())).or_at(Origin::File { line, column })
-}
-
-/// A collection whose end hasn't come yet.
-struct Open {
-    origin: Origin,
-    anchor: usize,
-    content: Content,
-}
-
-enum Content {
-    List(Vec<Node>),
-    Map { entries: Vec<Entry>, seen: BTreeSet<String>, key: Option<(String, Origin)> },
-}
-
-#[derive(Default)]
-struct Builder {
-    root: Option<Node>,
-    open: Vec<Open>,
-    /// What anchors (`&name`) stand for. Number 0 means none.
-    anchors: BTreeMap<usize, Node>,
-    copied: usize,
-}
-
-impl Builder {
-    fn take(&mut self, event: Event<'_>, origin: Origin) -> Result<(), Problem> {
-        match event {
-            Event::Nothing | Event::StreamStart | Event::StreamEnd | Event::DocumentEnd => Ok(()),
-            Event::DocumentStart(_) if self.root.is_some() => {
-                Err(Problem::new("a second document begins here; a pipeline file holds one").or_at(origin))
-            }
-            Event::DocumentStart(_) => Ok(()),
-            Event::Scalar(text, style, anchor, tag) => {
-                if self.wants_key() {
-                    return self.key(text.into_owned(), origin);
-                }
-                let value = scalar(&text, style, tag.as_deref()).map_err(|p| p.or_at(origin))?;
-                self.finish(Node { origin, value }, anchor)
-            }
-            Event::SequenceStart(anchor, tag) => {
-                self.begin(origin, anchor, tag.as_deref(), "seq", Content::List(Vec::new()))
-            }
-            Event::MappingStart(anchor, tag) => {
-                let map = Content::Map { entries: Vec::new(), seen: BTreeSet::new(), key: None };
-                self.begin(origin, anchor, tag.as_deref(), "map", map)
-            }
-            Event::SequenceEnd | Event::MappingEnd => match self.open.pop() {
-                Some(Open { origin, anchor, content }) => {
-                    let value = match content {
-                        Content::List(items) => Value::List(items),
-                        Content::Map { entries, .. } => Value::Map(entries),
-                    };
-                    self.finish(Node { origin, value }, anchor)
-                }
-                None => Ok(()),
-            },
-            Event::Alias(anchor) => self.alias(anchor, origin),
+    let message = match error {
+        Error::MultipleDocuments { .. } => {
+            let marks = text.lines().take(line).enumerate().filter(|(_, l)| l.starts_with("---"));
+            let line = marks.last().map_or(line, |(n, _)| n + 1);
+            return at(line, 1, "a second document begins here; a pipeline file holds one".into());
         }
-    }
-
-    /// Whether the next node is a mapping's key.
-    fn wants_key(&self) -> bool {
-        matches!(self.open.last(), Some(Open { content: Content::Map { key: None, .. }, .. }))
-    }
-
-    fn key(&mut self, word: String, origin: Origin) -> Result<(), Problem> {
-        if let Some(Open { content: Content::Map { seen, key, entries }, .. }) = self.open.last_mut() {
-            if !seen.insert(word.clone()) {
-                let first = entries.iter().find(|e| e.key == word).map(|e| e.origin);
-                let where_first = match first {
-                    Some(Origin::File { line, .. }) => format!("; it stands on line {line} already"),
-                    _ => String::new(),
-                };
-                let path = self.path();
-                let twice = Problem::new(format!("the key `{}` stands twice{where_first}", shorten(&word)));
-                return Err(path.into_iter().rev().fold(twice, Problem::inside).or_at(origin));
-            }
-            *key = Some((word, origin));
+        Error::Budget { breach: BudgetBreach::Depth { .. }, .. } => too_deep(),
+        Error::Budget { .. } | Error::AliasReplayLimitExceeded { .. } | Error::AliasReplayStackDepthExceeded { .. } => {
+            format!("anchors and aliases copy more than {MAX_COPIED} values; write the pipeline without them")
         }
-        Ok(())
-    }
-
-    /// The path to the innermost open collection.
-    fn path(&self) -> Vec<Segment> {
-        let inner = self.open.len().saturating_sub(1);
-        self.open[..inner]
-            .iter()
-            .filter_map(|open| match &open.content {
-                Content::List(items) => Some(Segment::Index(items.len())),
-                Content::Map { key, .. } => key.as_ref().map(|(word, _)| Segment::Key(word.clone())),
-            })
-            .collect()
-    }
-
-    fn begin(
-        &mut self,
-        origin: Origin,
-        anchor: usize,
-        tag: Option<&Tag>,
-        kind: &str,
-        content: Content,
-    ) -> Result<(), Problem> {
-        if self.wants_key() {
-            return Err(Problem::new("a key must be a word, not a list or a mapping").or_at(origin));
+        Error::RecursiveReferencesRequireWeakTypes { .. } => "this alias stands inside what it names".into(),
+        Error::UnsupportedTag { tag, .. } => {
+            format!("the tag `{}` has no meaning here; take it out", shorten(tag))
         }
-        if self.open.len() >= MAX_DEPTH {
-            return Err(too_deep().or_at(origin));
-        }
-        if let Some(tag) = tag.filter(|t| !(t.is_yaml_core_schema() && t.suffix == kind)) {
-            return Err(unknown_tag(tag).or_at(origin));
-        }
-        self.open.push(Open { origin, anchor, content });
-        Ok(())
-    }
-
-    /// Puts a whole node where it belongs.
-    fn finish(&mut self, node: Node, anchor: usize) -> Result<(), Problem> {
-        if anchor != 0 {
-            self.copied = self.copied.saturating_add(node.size().0);
-            self.check_copied(node.origin)?;
-            self.anchors.insert(anchor, node.clone());
-        }
-        match self.open.last_mut() {
-            None => self.root = Some(node),
-            Some(Open { content: Content::List(items), .. }) => items.push(node),
-            Some(Open { content: Content::Map { entries, key, .. }, .. }) => {
-                if let Some((key, origin)) = key.take() {
-                    entries.push(Entry { key, origin, value: node });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn alias(&mut self, anchor: usize, origin: Origin) -> Result<(), Problem> {
-        if self.wants_key() {
-            return Err(Problem::new("a key must be a word, not an alias").or_at(origin));
-        }
-        let Some(node) = self.anchors.get(&anchor) else {
-            return Err(Problem::new("this alias stands inside what it names").or_at(origin));
-        };
-        let (count, depth) = node.size();
-        if self.open.len() + depth > MAX_DEPTH {
-            return Err(too_deep().or_at(origin));
-        }
-        self.copied = self.copied.saturating_add(count);
-        let copy = if self.copied > MAX_COPIED { None } else { Some(node.clone()) };
-        self.check_copied(origin)?;
-        copy.map_or(Ok(()), |node| self.finish(node, 0))
-    }
-
-    fn check_copied(&self, origin: Origin) -> Result<(), Problem> {
-        if self.copied > MAX_COPIED {
-            let message =
-                format!("anchors and aliases copy more than {MAX_COPIED} values; write the pipeline without them");
-            return Err(Problem::new(message).or_at(origin));
-        }
-        Ok(())
-    }
-}
-
-fn too_deep() -> Problem {
-    Problem::new(format!("lists and mappings are more than {MAX_DEPTH} deep"))
-}
-
-fn unknown_tag(tag: &Tag) -> Problem {
-    Problem::new(format!("the tag `{}` has no meaning here; take it out", shorten(&tag.to_string())))
-}
-
-/// The value of a scalar: quoted and block text is text, the rest follows the core schema, and a core tag
-/// (`!!str`) insists on one kind.
-fn scalar(text: &str, style: ScalarStyle, tag: Option<&Tag>) -> Result<Value, Problem> {
-    let as_text = || Value::Text(text.to_owned());
-    let Some(tag) = tag else {
-        return Ok(if style == ScalarStyle::Plain { resolve_plain(text) } else { as_text() });
+        Error::InvalidScalar { .. } | Error::InvalidBooleanStrict { .. } => "is not what its tag says".into(),
+        // Only keys are asked to be text.
+        Error::Unexpected { expected: "string scalar", .. } => "a key must be a word, not a list or a mapping".into(),
+        other => match DefaultMessageFormatter.format_message(other) {
+            words if words == "recursion limit exceeded" => too_deep(),
+            words => format!("is not YAML: {words}"),
+        },
     };
-    if !tag.is_yaml_core_schema() {
-        return Err(unknown_tag(tag));
-    }
-    let value = resolve_plain(text);
-    let fits = match (tag.suffix.as_str(), &value) {
-        ("str", _) => return Ok(as_text()),
-        ("float", Value::Integer(i)) => return Ok(Value::Float(*i as f64)),
-        ("null", Value::Null) | ("bool", Value::Bool(_)) | ("int", Value::Integer(_)) | ("float", Value::Float(_)) => {
-            true
-        }
-        ("null" | "bool" | "int" | "float", _) => false,
-        _ => return Err(unknown_tag(tag)),
-    };
-    if fits {
-        Ok(value)
-    } else {
-        Err(Problem::new(format!("{} is not what its tag `!!{}` says", describe(&value), tag.suffix)))
-    }
+    at(line, column, message)
+}
+
+fn too_deep() -> String {
+    format!("lists and mappings are more than {MAX_DEPTH} deep")
 }
 
 #[cfg(test)]
@@ -272,8 +218,6 @@ mod tests {
     #[test]
     fn refusals() {
         for (text, line, part) in [
-            ("", 1, "is empty"),
-            ("# nothing\n", 1, "is empty"),
             ("a: 1\na: 2\n", 2, "`a` stands twice; it stands on line 1"),
             ("a: 1\n---\nb: 1\n", 2, "second document"),
             ("a:\n\tb: 1\n", 2, "a tab indents"),
@@ -283,8 +227,10 @@ mod tests {
             ("[1]: 2\n", 1, "a key must be a word"),
             ("a: &x [*x]\n", 1, "inside what it names"),
             ("a: *x\n", 1, "is not YAML"),
-            ("a: [1, 2\n", 2, "is not YAML"),
+            ("a: [1, 2\n", 1, "is not YAML"),
             ("a: 'x\n", 1, "is not YAML"),
+            ("a: 1\nb: {c: 1, c: 2}\n", 2, "`c` stands twice; it stands on line 2"),
+            ("a: !!timestamp 2001-01-01\n", 1, "tag"),
         ] {
             let refusal = refusal(text);
             assert!(refusal.contains(part), "{text:?}: {refusal}");
@@ -294,10 +240,14 @@ mod tests {
 
     #[test]
     fn depth_is_bounded() {
-        assert!(parse(&("[".repeat(64) + &"]".repeat(64))).is_ok());
-        for open in ["[", "{a: ", "- ", "? "] {
-            assert!(parse(&open.repeat(100_000)).is_err(), "{open}");
+        for (open, close) in [("[", "]"), ("{a: ", "}"), ("- ", "")] {
+            let nested = |n: usize| format!("{}1{}", open.repeat(n), close.repeat(n));
+            assert!(parse(&nested(64)).is_ok(), "{open}");
+            for n in [65, 100, 20_000] {
+                assert!(refusal(&nested(n)).contains("lists and mappings are more than 64 deep"), "{open} {n}");
+            }
         }
+        assert!(parse(&"? ".repeat(100_000)).is_err());
     }
 
     #[test]
@@ -314,5 +264,37 @@ mod tests {
     fn aliases_copy() {
         let root = parse("a: &eye [1, 2]\nb: *eye\n").unwrap();
         assert_eq!(root.get("b").unwrap().items().len(), 2);
+    }
+
+    fn shown(text: &str) -> String {
+        let root = parse(&format!("- {text}")).unwrap_or_else(|e| panic!("{text}: {e}"));
+        format!("{:?}", root.items()[0].value)
+    }
+
+    #[test]
+    fn values_are_those_of_the_core_schema() {
+        for (text, value) in [
+            ("~", "Null"),
+            ("True", "Bool(true)"),
+            ("12", "Integer(12)"),
+            ("-3", "Integer(-3)"),
+            ("+7", "Integer(7)"),
+            ("0x1F", "Integer(31)"),
+            ("0o17", "Integer(15)"),
+            ("18446744073709551615", "Integer(18446744073709551615)"),
+            ("1.", "Float(1.0)"),
+            (".5", "Float(0.5)"),
+            ("-1e-3", "Float(-0.001)"),
+            ("-.inf", "Float(-inf)"),
+            (".NaN", "Float(NaN)"),
+            ("99999999999999999999", "Float(1e20)"),
+        ] {
+            assert_eq!(shown(text), value, "{text}");
+        }
+        let texts = "inf nan yes 1:30 1_000 e5 . + 0x 0x-1 --1 1e infinity 1.2.3";
+        texts.split(' ').chain(["'1'", "\"~\"", "!!str 1"]).for_each(|text| {
+            let plain = text.trim_start_matches("!!str ").trim_matches(['\'', '"']);
+            assert_eq!(shown(text), format!("Text({plain:?})"));
+        });
     }
 }

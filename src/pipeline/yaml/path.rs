@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::MAX_DEPTH;
+
 /// One step into a tree.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Segment {
@@ -23,12 +25,18 @@ pub fn parse_path(text: &str) -> Result<Vec<Segment>, String> {
         }
         segments.push(Segment::Key(key.to_owned()));
         rest = tail;
+        if segments.len() > MAX_DEPTH {
+            return Err(format!("the key is more than {MAX_DEPTH} levels deep"));
+        }
         while let Some(inner) = rest.strip_prefix('[') {
             let Some((index, tail)) = inner.split_once(']') else { return Err("`[` has no `]`".into()) };
             let index =
                 index.parse().map_err(|_| format!("`[{index}]` isn't a position in a list; the first is [0]"))?;
             segments.push(Segment::Index(index));
             rest = tail;
+            if segments.len() > MAX_DEPTH {
+                return Err(format!("the key is more than {MAX_DEPTH} levels deep"));
+            }
         }
         match rest.strip_prefix('.') {
             Some(tail) => rest = tail,

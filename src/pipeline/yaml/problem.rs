@@ -10,6 +10,7 @@ use serde::de::{self, Expected, Unexpected};
 
 use super::{Origin, Segment, shorten, show_path};
 use crate::pipeline::suggest;
+use crate::text::number;
 
 /// A refusal on its way out.
 #[derive(Debug)]
@@ -144,7 +145,7 @@ fn found_in_words(found: Unexpected<'_>) -> String {
         Unexpected::Bool(b) => format!("`{b}`"),
         Unexpected::Unsigned(n) => format!("the number {n}"),
         Unexpected::Signed(n) => format!("the number {n}"),
-        Unexpected::Float(x) => format!("the number {x:?}"),
+        Unexpected::Float(x) => format!("the number {}", number(x)),
         Unexpected::Str(text) => format!("the text \"{}\"", shorten(text)),
         Unexpected::Unit | Unexpected::Option => "nothing".into(),
         Unexpected::Seq => "a list".into(),

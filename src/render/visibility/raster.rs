@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::NOTHING;
 use super::footprint::Footprint;
 use crate::accel::Tracer;
-use crate::geometry::Vector;
+use crate::geometry::{Dimension, Vector};
 use crate::mesh::Mesh;
 use crate::progress::{Cancelled, Progress};
 use crate::render::camera::{Camera, Lens};
@@ -130,7 +130,7 @@ impl Raster {
     /// Whether it promises to be faster than a ray for each voxel, and a hierarchy if there is none yet. The costs are
     /// nanoseconds on one machine; what counts is their ratio.
     pub fn is_cheaper<const D: usize>(&self, grid: &Grid, prepared: bool) -> bool {
-        let filled = if D == 3 { 1.0 / 2.0 } else { 1.0 / 6.0 };
+        let filled = 1.0 / f64::from(Dimension::of::<D>().simplices_a_cube());
         let convert = |b: &Box3| {
             let rows = b.count(1) * b.count(2);
             if b.is_empty() { 0.0 } else { 300.0 + rows * (15.0 + 3.0 * filled * b.count(0)) }

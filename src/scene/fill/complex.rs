@@ -1,94 +1,55 @@
-//! Space in convex cells that fit together: cells have faces, faces have corners, and what two share is one.
+//! A solid in polyhedral cells that fit together: cells have faces, faces have corners, and what two share is one.
 //!
-//! A cell is split by a plane, and with it those of its faces and edges that the plane crosses. The cells on the other side of
-//! a face that was split learn of it when they are looked at: a split face knows its halves, and a split edge its middle. So
-//! faces that are flush may be several, and sides of a face may have corners along them, but nowhere does one cell's face
-//! meet a part of another's.
+//! Faces are convex polygons; cells need not be convex. A cell is cut by a plane across an axis, and with it those of its faces
+//! and edges that the plane crosses. The cells on the other side of a face that was cut learn of it when they are looked
+//! at: a cut face knows its halves, and a cut edge its middle. So faces that are flush may be several, and sides of a face
+//! may have corners along them, but nowhere does one cell's face meet a part of another's.
 
 use std::collections::HashMap;
 
-use num_bigint::BigInt;
+use super::kernel::Plane;
+use super::section;
+use crate::geometry::Vector64;
 
-use super::exact::{Plane, Point, turn};
-
-/// A convex polygon between two cells.
+/// A convex polygon: of the surface, with the outside on its positive side, or between two cells.
 struct Face {
     /// Corners, counterclockwise as seen from the plane's positive side.
     corners: Vec<u32>,
-    plane: u32,
+    plane: Plane,
     halves: Option<[u32; 2]>,
 }
 
-/// Where the complex is split further: a plane and what is on both sides of it, or a cell.
-#[derive(Clone, Copy)]
-pub enum Node {
-    /// What is on the plane's negative and on its positive side.
-    Split {
-        /// The plane.
-        plane: u32,
-        /// Nodes on its negative and positive side.
-        sides: [u32; 2],
-    },
-    /// One convex cell.
-    Cell(u32),
-}
+/// A face as seen from one of its cells: its number, and whether the cell is on its plane's positive side.
+pub type Side = (u32, bool);
 
-/// Convex cells that fill a box.
+/// Cells under construction: their points, faces and cut edges.
 pub struct Complex {
-    pub points: Vec<Point>,
-    pub planes: Vec<Plane>,
+    pub points: Vec<Vector64<3>>,
     faces: Vec<Face>,
-    /// Middles of split edges, by the lower and the higher end.
-    middles: HashMap<(u32, u32), u32>,
-    /// Faces of each cell, and whether it is on their planes' positive side.
-    cells: Vec<Vec<(u32, bool)>>,
-    /// The tree of splits; the first is the root.
-    pub nodes: Vec<Node>,
+    /// Middles of cut edges, by the lower and the higher end.
+    middles: HashMap<[u32; 2], u32>,
 }
 
 impl Complex {
-    /// One cell, a box with whole corners.
-    pub fn new([low, high]: [[BigInt; 3]; 2]) -> Self {
-        let mut complex = Self {
-            points: Vec::new(),
-            planes: Vec::new(),
-            faces: Vec::new(),
-            middles: HashMap::new(),
-            cells: vec![Vec::new()],
-            nodes: vec![Node::Cell(0)],
-        };
-        for corner in 0..8 {
-            let at = |axis: usize| if corner >> axis & 1 == 1 { high[axis].clone() } else { low[axis].clone() };
-            complex.points.push(Point::whole([at(0), at(1), at(2)]));
+    /// The cell within triangles that face outwards; those without area, which have no plane, are left out.
+    pub fn new(points: Vec<Vector64<3>>, triangles: &[[u32; 3]]) -> (Self, Vec<Side>) {
+        let mut faces = Vec::with_capacity(triangles.len());
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|i| points[i as usize]);
+            let normal = (b - a).cross(&(c - a));
+            // Too small to have a direction, the normal is that of nothing: no point is inside or outside of it.
+            let normal = normal.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
+            let plane = Plane { normal, offset: normal.dot(&((a + b + c) / 3.0)) };
+            faces.push(Face { corners: triangle.to_vec(), plane, halves: None });
         }
-        for axis in 0..3 {
-            for (end, limit) in [&low, &high].into_iter().enumerate() {
-                let plane = complex.add_plane(Plane::across(axis, limit[axis].clone()));
-                let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-                let start = (end as u32) << axis;
-                let corners = vec![start, start | 1 << i, start | 1 << i | 1 << j, start | 1 << j];
-                complex.faces.push(Face { corners, plane, halves: None });
-                complex.cells[0].push((complex.faces.len() as u32 - 1, end == 0));
-            }
-        }
-        complex
+        let cell = (0..faces.len() as u32).map(|face| (face, false)).collect();
+        (Self { points, faces, middles: HashMap::new() }, cell)
     }
 
-    /// A new plane's number.
-    pub fn add_plane(&mut self, plane: Plane) -> u32 {
-        self.planes.push(plane);
-        self.planes.len() as u32 - 1
-    }
-
-    /// The number of cells.
-    pub fn len(&self) -> usize {
-        self.cells.len()
-    }
-
-    /// A cell's faces as they are by now, and whether it is on their planes' positive side.
-    pub fn faces_of(&self, cell: u32) -> Vec<(u32, bool)> {
-        let mut found = Vec::new();
-        let mut open: Vec<(u32, bool)> = self.cells[cell as usize].iter().rev().copied().collect();
+    /// A cell's faces as they are by now.
+    pub fn resolve(&self, cell: &[Side]) -> Vec<Side> {
+        let mut found = Vec::with_capacity(cell.len());
+        let mut open: Vec<Side> = cell.iter().rev().copied().collect();
         while let Some((face, positive)) = open.pop() {
             match self.faces[face as usize].halves {
                 Some(halves) => open.extend(halves.iter().rev().map(|&half| (half, positive))),
@@ -98,21 +59,22 @@ impl Complex {
         found
     }
 
-    /// A face's plane.
-    pub fn plane_of(&self, face: u32) -> u32 {
-        self.faces[face as usize].plane
+    /// The plane of a face, facing out of the cell.
+    pub fn plane(&self, (face, positive): Side) -> Plane {
+        let Plane { normal, offset } = self.faces[face as usize].plane;
+        if positive { Plane { normal: -normal, offset: -offset } } else { Plane { normal, offset } }
     }
 
     /// A face's corners as they are by now, counterclockwise as seen from the plane's positive side; among them those along
     /// its sides.
-    pub fn corners_of(&self, face: u32) -> Vec<u32> {
+    pub fn corners(&self, face: u32) -> Vec<u32> {
         let corners = &self.faces[face as usize].corners;
         let mut found = Vec::with_capacity(corners.len() + 2);
         for (i, &from) in corners.iter().enumerate() {
             // The ends of pieces still to come, the nearest last.
             let (mut from, mut ends) = (from, vec![corners[(i + 1) % corners.len()]]);
             while let Some(&end) = ends.last() {
-                match self.middles.get(&(from.min(end), from.max(end))) {
+                match self.middles.get(&ordered(from, end)) {
                     Some(&middle) => ends.push(middle),
                     None => {
                         found.push(from);
@@ -125,110 +87,109 @@ impl Complex {
         found
     }
 
-    /// Splits a node's cell by a plane that has points of it on both sides.
-    pub fn split(&mut self, node: u32, plane: u32) {
-        let Node::Cell(cell) = self.nodes[node as usize] else { return };
-        let faces = self.faces_of(cell);
-        let mut sides: HashMap<u32, i32> = HashMap::new();
-        // The plane's own edges within the cell, by their ends.
-        let mut rim: Vec<(u32, u32)> = Vec::new();
-        let mut parts: [Vec<(u32, bool)>; 2] = Default::default();
-        for (face, positive) in faces {
-            let corners = self.corners_of(face);
-            for &corner in &corners {
-                let side = || self.planes[plane as usize].side(&self.points[corner as usize]);
-                sides.entry(corner).or_insert_with(side);
-            }
-            let signs: Vec<i32> = corners.iter().map(|corner| sides[corner]).collect();
-            if signs.iter().all(|&s| s >= 0) || signs.iter().all(|&s| s <= 0) {
-                for i in 0..corners.len() {
-                    let j = (i + 1) % corners.len();
-                    if signs[i] == 0 && signs[j] == 0 {
-                        rim.push((corners[i].min(corners[j]), corners[i].max(corners[j])));
-                    }
-                }
-                parts[usize::from(signs.iter().any(|&s| s > 0))].push((face, positive));
+    /// The same, counterclockwise as seen from outside the cell.
+    pub fn corners_outward(&self, (face, positive): Side) -> Vec<u32> {
+        let mut corners = self.corners(face);
+        if positive {
+            corners.reverse();
+        }
+        corners
+    }
+
+    /// Cuts a cell by the plane across an axis at a value that no corner of it has: what is below, and what is above.
+    ///
+    /// # Errors
+    /// A point near which the surface passes through itself; nothing is cut then.
+    pub fn cut(&mut self, cell: &[Side], axis: usize, at: f64) -> Result<[Vec<Side>; 2], Vector64<3>> {
+        let mut parts: [Vec<Side>; 2] = Default::default();
+        let mut crossed: Vec<(Side, Vec<u32>)> = Vec::new();
+        // Edges of the section by the edges that its corners are on, around what is to be filled as seen from above.
+        let mut rim: Vec<[[u32; 2]; 2]> = Vec::new();
+        for &(face, positive) in cell {
+            let corners = self.corners(face);
+            let above = |i: usize| self.points[corners[i % corners.len()] as usize][axis] > at;
+            if (1..corners.len()).all(|i| above(i) == above(0)) {
+                parts[usize::from(above(0))].push((face, positive));
                 continue;
             }
+            let edge = |i: usize| ordered(corners[i], corners[(i + 1) % corners.len()]);
+            let leaves = |upwards: bool| (0..corners.len()).filter(move |&i| (!above(i) && above(i + 1)) == upwards);
+            let leaves = |upwards: bool| leaves(upwards).filter(|&i| above(i) != above(i + 1)).collect::<Vec<_>>();
+            let (&[up], &[down]) = (&leaves(true)[..], &leaves(false)[..]) else {
+                return Err(self.points[corners[0] as usize]);
+            };
+            // The part below has the edge from `up` to `down` if seen from outside, the section the opposite.
+            rim.push(if positive { [edge(up), edge(down)] } else { [edge(down), edge(up)] });
+            crossed.push(((face, positive), corners));
+        }
+        let mut edges: Vec<[u32; 2]> = rim.as_flattened().to_vec();
+        edges.sort_unstable();
+        edges.dedup();
+        let middles: Vec<Vector64<3>> = edges.iter().map(|edge| self.middle(edge, axis, at)).collect();
+        let flat: Vec<[f64; 2]> = middles.iter().map(|p| [1, 2].map(|k| p[(axis + k) % 3])).collect();
+        let index = |edge: [u32; 2]| edges.binary_search(&edge).unwrap_or_default() as u32;
+        let rim: Vec<[u32; 2]> = rim.into_iter().map(|ends| ends.map(index)).collect();
+        let triangles = section::triangles(&flat, &rim).map_err(|point| middles[point as usize])?;
+
+        let first = self.points.len() as u32;
+        self.points.extend(middles);
+        self.middles.extend(edges.into_iter().zip(first..));
+        for ((face, positive), corners) in crossed {
             let mut loops: [Vec<u32>; 2] = Default::default();
-            let mut on = Vec::with_capacity(2);
-            for i in 0..corners.len() {
-                let j = (i + 1) % corners.len();
-                match signs[i] {
-                    0 => {
-                        loops.iter_mut().for_each(|l| l.push(corners[i]));
-                        on.push(corners[i]);
-                    }
-                    s => loops[usize::from(s > 0)].push(corners[i]),
-                }
-                if signs[i] * signs[j] < 0 {
-                    let middle = self.split_edge(corners[i], corners[j], plane);
-                    sides.insert(middle, 0);
-                    loops.iter_mut().for_each(|l| l.push(middle));
-                    on.push(middle);
+            for (i, &corner) in corners.iter().enumerate() {
+                loops[usize::from(self.points[corner as usize][axis] > at)].push(corner);
+                if let Some(&middle) = self.middles.get(&ordered(corner, corners[(i + 1) % corners.len()])) {
+                    loops.iter_mut().for_each(|corners| corners.push(middle));
                 }
             }
-            debug_assert_eq!(on.len(), 2, "a plane meets a convex polygon's sides twice");
-            rim.push((on[0].min(on[1]), on[0].max(on[1])));
-            let halves = loops.map(|corners| {
-                self.faces.push(Face { corners, plane: self.faces[face as usize].plane, halves: None });
-                self.faces.len() as u32 - 1
-            });
+            let plane = self.faces[face as usize].plane;
+            let halves = loops.map(|corners| self.add_face(corners, plane));
             self.faces[face as usize].halves = Some(halves);
             for (part, half) in parts.iter_mut().zip(halves) {
                 part.push((half, positive));
             }
         }
-        let between = self.cut_face(rim, plane);
-        parts[0].push((between, false));
-        parts[1].push((between, true));
-        let [negative, positive] = parts;
-        self.cells[cell as usize] = negative;
-        self.cells.push(positive);
-        let next = self.nodes.len() as u32;
-        self.nodes.push(Node::Cell(cell));
-        self.nodes.push(Node::Cell(self.cells.len() as u32 - 1));
-        self.nodes[node as usize] = Node::Split { plane, sides: [next, next + 1] };
+        let plane = Plane { normal: Vector64::from_fn(|r, _| f64::from(r == axis)), offset: at };
+        for triangle in triangles {
+            let face = self.add_face(triangle.map(|i| first + i).to_vec(), plane);
+            parts[0].push((face, false));
+            parts[1].push((face, true));
+        }
+        Ok(parts)
     }
 
-    fn split_edge(&mut self, a: u32, b: u32, plane: u32) -> u32 {
-        let key = (a.min(b), a.max(b));
-        if let Some(&middle) = self.middles.get(&key) {
-            return middle;
+    /// The shortest side of the section that a plane would make through faces with these corners.
+    pub fn shortest_side(&self, loops: &[Vec<u32>], axis: usize, at: f64) -> f64 {
+        let mut shortest = f64::INFINITY;
+        for corners in loops {
+            let above = |i: usize| self.points[corners[i % corners.len()] as usize][axis] > at;
+            let mut before: Option<Vector64<3>> = None;
+            for i in (0..corners.len()).filter(|&i| above(i) != above(i + 1)) {
+                let here = self.middle(&ordered(corners[i], corners[(i + 1) % corners.len()]), axis, at);
+                if let Some(before) = before {
+                    shortest = shortest.min((here - before).norm());
+                }
+                before = Some(here);
+            }
         }
-        let [from, to] = [key.0, key.1].map(|i| &self.points[i as usize]);
-        self.points.push(Point::between(from, to, &self.planes[plane as usize]));
-        let middle = self.points.len() as u32 - 1;
-        self.middles.insert(key, middle);
-        middle
+        shortest
     }
 
-    /// The face along a plane, from its edges.
-    fn cut_face(&mut self, mut rim: Vec<(u32, u32)>, plane: u32) -> u32 {
-        rim.sort_unstable();
-        rim.dedup();
-        let mut next: HashMap<u32, Vec<u32>> = HashMap::new();
-        for &(a, b) in &rim {
-            next.entry(a).or_default().push(b);
-            next.entry(b).or_default().push(a);
-        }
-        let start = rim[0].0;
-        let (mut before, mut here) = (u32::MAX, start);
-        let mut corners = Vec::with_capacity(rim.len());
-        while corners.len() < rim.len() {
-            corners.push(here);
-            let onwards = next[&here].iter().copied().find(|&other| other != before).unwrap_or(start);
-            (before, here) = (here, onwards);
-        }
-        debug_assert_eq!(here, start, "the rim of a cut closes");
-        // Counterclockwise as seen from the positive side.
-        let (axis, sign) = self.planes[plane as usize].view();
-        let of = |i: usize| &self.points[corners[i] as usize];
-        let way = (1..corners.len() - 1).map(|i| turn([of(0), of(i), of(i + 1)], axis)).find(|&t| t != 0);
-        if way.is_some_and(|way| way != sign) {
-            corners.reverse();
-        }
+    fn add_face(&mut self, corners: Vec<u32>, plane: Plane) -> u32 {
         self.faces.push(Face { corners, plane, halves: None });
         self.faces.len() as u32 - 1
     }
+
+    /// Where an edge meets the plane across an axis.
+    fn middle(&self, edge: &[u32; 2], axis: usize, at: f64) -> Vector64<3> {
+        let [from, to] = edge.map(|i| self.points[i as usize]);
+        let mut point = from + (to - from) * ((at - from[axis]) / (to[axis] - from[axis]));
+        point[axis] = at;
+        point
+    }
+}
+
+/// An edge as a key.
+fn ordered(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
 }

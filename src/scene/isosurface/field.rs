@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::super::Error;
 use super::super::numbers::{finite, positive};
 use super::image::ImageSpec;
+use crate::geometry::Dimension;
 
 /// The field whose isosurface is taken: exactly one of these.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -122,15 +123,14 @@ impl Field {
     }
 
     /// The field as an expression.
-    pub fn define(&self, dimension: usize) -> Result<Definition, Error> {
+    pub fn define(&self, dimension: Dimension) -> Result<Definition, Error> {
         let path = |key: &str| format!("isosurface.field.{}{}{key}", self.key(), if key.is_empty() { "" } else { "." });
-        let fits = match self {
-            Field::Formula(_) | Field::Image(_) | Field::Hypersphere(_) | Field::Gyroid(_) => true,
-            Field::Torus(_) => dimension == 3,
-            _ => dimension == 4,
+        let wanted = match self {
+            Field::Formula(_) | Field::Image(_) | Field::Hypersphere(_) | Field::Gyroid(_) => dimension,
+            Field::Torus(_) => Dimension::Three,
+            Field::Tiger(_) | Field::Torisphere(_) | Field::Spheritorus(_) | Field::Ditorus(_) => Dimension::Four,
         };
-        if !fits {
-            let wanted = 7 - dimension;
+        if wanted != dimension {
             return Err(Error::invalid(path(""), format!("needs a scene of dimension {wanted}, not {dimension}")));
         }
         let radius = |key: &str, value: f64| positive(&path(key), value);
@@ -139,7 +139,7 @@ impl Field {
             Field::Image(_) => return Err(Error::invalid(path(""), "is no formula")),
             Field::Hypersphere(RoundSpec { radius: r }) => {
                 let r = radius("radius", *r)?;
-                let squares = if dimension == 3 { "x^2 + y^2 + z^2" } else { "x^2 + y^2 + z^2 + w^2" };
+                let squares = dimension.pick("x^2 + y^2 + z^2", "x^2 + y^2 + z^2 + w^2");
                 (format!("sqrt({squares}) - {r}"), Some([r; 4]))
             }
             Field::Tiger(TigerSpec { major: [a, b], minor: r }) => {
@@ -166,9 +166,9 @@ impl Field {
             }
             Field::Gyroid(GyroidSpec { period, wall }) => {
                 let k = std::f64::consts::TAU / radius("period", *period)?;
-                let axes = &["x", "y", "z", "w"][..dimension];
-                let term = |i: usize| format!("sin({k}*{}) * cos({k}*{})", axes[i], axes[(i + 1) % dimension]);
-                let sum = (0..dimension).map(term).collect::<Vec<_>>().join(" + ");
+                let axes = dimension.axes();
+                let term = |i: usize| format!("sin({k}*{}) * cos({k}*{})", axes[i], axes[(i + 1) % axes.len()]);
+                let sum = (0..axes.len()).map(term).collect::<Vec<_>>().join(" + ");
                 match wall {
                     None => (sum, None),
                     Some(wall) => (format!("abs({sum}) - {}", radius("wall", *wall)?), None),

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::table::{Case, Edge, Table};
 use crate::geometry::Vector64;
 use crate::mesh::Surface;
+use crate::progress::Progress;
 
 /// The nearest that a vertex comes to a grid point, in edges. It keeps slivers few and no two vertices at one place.
 const NEAREST: f64 = 0.02;
@@ -39,6 +40,8 @@ pub trait Layers {
 pub enum Stop<E> {
     /// The field can't be had.
     Field(E),
+    /// Whoever watches wants no more of it.
+    Cancelled,
     /// There are more simplices than allowed.
     TooMany,
 }
@@ -53,6 +56,7 @@ pub fn march<const D: usize, L: Layers>(
     pad: bool,
     most: u64,
     field: &mut L,
+    progress: &dyn Progress,
 ) -> Result<Surface<D>, Stop<L::Error>> {
     let given = Shape::new(axes.clone());
     let shape = if pad { Shape::new(axes.map(padded)) } else { Shape::new(axes) };
@@ -68,6 +72,9 @@ pub fn march<const D: usize, L: Layers>(
         } else {
             field.next(&mut values).map_err(Stop::Field)?;
             above.load(&slab.shape, &given, &values, pad);
+        }
+        if progress.cancelled() {
+            return Err(Stop::Cancelled);
         }
         above.find_crossings(&slab.shape);
         slab.place_vertices(&mut above.runs, D - 1, most, &mut surface.vertices, |row, axis, x| {

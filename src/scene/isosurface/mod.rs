@@ -13,7 +13,7 @@ pub mod image;
 pub mod march;
 pub mod table;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -21,12 +21,14 @@ use serde::{Deserialize, Serialize};
 
 use self::expression::{Expression, Rows};
 use self::field::Field;
-use self::image::ImageSpec;
+use self::image::{Grid, ImageSpec};
 use self::march::{Layers, Stop};
 use super::Error;
 use super::lattice::divide;
 use super::numbers::{AXES, MAX_SIMPLICES, OneOrEach, bounds, finite};
+use crate::geometry::Dimension;
 use crate::mesh::Surface;
+use crate::progress::Progress;
 use crate::volume::available_memory;
 
 /// The most points a layer of a grid may have: a few layers are held in memory.
@@ -90,20 +92,25 @@ pub struct GridSpec {
 }
 
 impl IsosurfaceSpec {
-    /// The files it is read from, as the pipeline names them.
-    pub fn input_files(&self) -> Vec<&Path> {
+    /// The files it is read from, those among them that only a header names; paths are relative to `folder`.
+    pub fn input_files(&self, folder: &Path) -> Vec<PathBuf> {
         match &self.field {
-            Field::Image(image) => image.files().collect(),
+            Field::Image(image) => image.input_files(folder),
             _ => Vec::new(),
         }
     }
 
     /// The surface. Files are relative to `folder`. Where the field never passes the isovalue there is none, or only the
     /// grid's own border; `notes` say so, and how many values are no numbers.
-    pub fn build<const D: usize>(&self, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
+    pub fn build<const D: usize>(
+        &self,
+        folder: &Path,
+        notes: &mut Vec<String>,
+        progress: &dyn Progress,
+    ) -> Result<Surface<D>, Error> {
         match &self.field {
-            Field::Image(image) => self.of_image(image, folder, notes),
-            _ => self.of_formula(notes),
+            Field::Image(image) => self.of_image(image, folder, notes, progress),
+            _ => self.of_formula(notes, progress),
         }
     }
 
@@ -112,6 +119,7 @@ impl IsosurfaceSpec {
         image: &ImageSpec,
         folder: &Path,
         notes: &mut Vec<String>,
+        progress: &dyn Progress,
     ) -> Result<Surface<D>, Error> {
         if self.grid.is_some() {
             let message = "an image has a grid of its own; place it by spacing and origin, or take a part by crop";
@@ -121,24 +129,31 @@ impl IsosurfaceSpec {
             return Err(Error::invalid("isosurface", "an image needs an isovalue: the value that the surface is at"));
         };
         let isovalue = finite("isosurface.isovalue", isovalue)?;
-        let (mut layers, axes) = image.open::<D>(folder, isovalue, self.inside.unwrap_or(Side::Above))?;
-        check_grid("isosurface.field.image", &axes.each_ref().map(|axis| axis.len() as u128))?;
+        let inside = self.inside.unwrap_or(Side::Above);
+        let Grid { mut layers, axes, placed } = image.open::<D>(folder, isovalue, inside, notes)?;
         if let Some(axis) = axes.iter().position(|axis| axis.len() < 2).filter(|_| !self.pad) {
             let message = format!("the image has one point along {}; it needs two, or pad: true", AXES[axis]);
             return Err(Error::invalid("isosurface.pad", message));
         }
         let backwards = axes.iter().filter(|axis| axis.len() > 1 && axis[1] < axis[0]).count();
-        let mut surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut layers);
+        let mut surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut layers, progress);
         if let (Ok(surface), 1) = (&mut surface, backwards % 2) {
             surface.simplices.iter_mut().for_each(|simplex| simplex.swap(D - 2, D - 1));
+        }
+        if let (Ok(surface), Some(placed)) = (&mut surface, placed) {
+            placed.apply(surface);
         }
         finish(surface, &layers.seen, isovalue, self.smallest_component, notes)
     }
 
-    fn of_formula<const D: usize>(&self, notes: &mut Vec<String>) -> Result<Surface<D>, Error> {
+    fn of_formula<const D: usize>(
+        &self,
+        notes: &mut Vec<String>,
+        progress: &dyn Progress,
+    ) -> Result<Surface<D>, Error> {
         let isovalue = finite("isosurface.isovalue", self.isovalue.unwrap_or(0.0))?;
         let inside = self.inside.unwrap_or(Side::Below);
-        let definition = self.field.define(D)?;
+        let definition = self.field.define(Dimension::of::<D>())?;
         let formula_key = format!("isosurface.field.{}", self.field.key());
         let expression = Expression::parse(&definition.formula, &AXES[..D])
             .map_err(|message| Error::invalid(&formula_key, message))?;
@@ -155,8 +170,9 @@ impl IsosurfaceSpec {
             isovalue,
             sign: if inside == Side::Below { -1.0 } else { 1.0 },
             seen: Seen::default(),
+            progress,
         };
-        let surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut sampled);
+        let surface = march::march(axes, self.pad, MAX_SIMPLICES, &mut sampled, progress);
         finish(surface, &sampled.seen, isovalue, self.smallest_component, notes)
     }
 }
@@ -172,6 +188,7 @@ fn finish<const D: usize>(
     let surface = match surface {
         Ok(surface) => surface,
         Err(Stop::Field(error)) => return Err(error),
+        Err(Stop::Cancelled) => return Err(Error::Cancelled),
         Err(Stop::TooMany) => {
             let message = format!(
                 "the surface has more than {MAX_SIMPLICES} simplices, the most that one object may have; \
@@ -317,20 +334,21 @@ impl Seen {
 }
 
 /// A formula, looked at layer by layer.
-struct Sampled<const D: usize> {
+struct Sampled<'p, const D: usize> {
     rows: Rows,
     axes: [Vec<f64>; D],
     layer: usize,
     isovalue: f64,
     sign: f64,
     seen: Seen,
+    progress: &'p dyn Progress,
 }
 
-impl<const D: usize> Layers for Sampled<D> {
+impl<const D: usize> Layers for Sampled<'_, D> {
     type Error = Error;
 
     fn next(&mut self, values: &mut [f32]) -> Result<(), Error> {
-        let Self { rows, axes, layer, isovalue, sign, seen } = self;
+        let Self { rows, axes, layer, isovalue, sign, seen, progress } = self;
         let width = axes[0].len();
         let row_of = |mut row: usize, at: &mut [f64; 3]| {
             for axis in 1..D - 1 {
@@ -341,6 +359,10 @@ impl<const D: usize> Layers for Sampled<D> {
         };
         let look = |buffers: &mut Vec<Vec<f64>>, (row, values): (usize, &mut [f32])| {
             let (mut at, mut seen) = ([0.0; 3], Seen::default());
+            // The march hears of it after this layer, which is then left unfinished.
+            if progress.cancelled() {
+                return seen;
+            }
             row_of(row, &mut at);
             rows.evaluate(&at[..D - 1], buffers, |x, value| values[x] = seen.look(value, *isovalue, *sign));
             seen

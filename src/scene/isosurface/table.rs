@@ -283,7 +283,7 @@ mod tests {
     use rayon::prelude::*;
 
     use super::*;
-    use crate::mesh::topology::sort_with_parity;
+    use crate::mesh::facets::sort_with_parity;
 
     /// Simplices of at most three vertices, sorted, and how often each is there; those that cancel left out.
     type Sum = Vec<([u8; 3], i32)>;

@@ -6,6 +6,22 @@ use super::{BINARY, Binary, CONSTANTS, Node, UNARY, Unary, Value, depends, evalu
 /// How deep parentheses, signs and powers may nest.
 const DEEPEST: usize = 64;
 
+/// How many arguments min and max take.
+const MOST_ARGUMENTS: usize = 1000;
+
+/// Two or more arguments as a tree that is no deeper than it must be, in the order written. Min and max give the same
+/// bits in whatever way their arguments are paired.
+fn balanced(function: Binary, mut nodes: Vec<Node>) -> Node {
+    match nodes.len() {
+        0 => Node::Number(0.0), // a function's first argument is always there
+        1 => nodes.swap_remove(0),
+        n => {
+            let rest = nodes.split_off(n / 2);
+            Node::Binary(function, Box::new(balanced(function, nodes)), Box::new(balanced(function, rest)))
+        }
+    }
+}
+
 /// What is left of a formula.
 pub(super) struct Parser<'a> {
     text: &'a str,
@@ -185,12 +201,14 @@ impl<'a> Parser<'a> {
                 if !self.take(',') {
                     return Err(self.wrong(&format!("expected \",\": {name} has two arguments or more")));
                 }
-                let mut node = Node::Binary(function, first, Box::new(self.sum()?));
-                // min and max take as many as there are.
+                let mut arguments = vec![*first, self.sum()?];
                 while matches!(function, Binary::Min | Binary::Max) && self.take(',') {
-                    node = Node::Binary(function, Box::new(node), Box::new(self.sum()?));
+                    if arguments.len() == MOST_ARGUMENTS {
+                        return Err(self.wrong(&format!("{name} takes at most {MOST_ARGUMENTS} arguments")));
+                    }
+                    arguments.push(self.sum()?);
                 }
-                node
+                balanced(function, arguments)
             }
             (None, None) => *first,
         };

@@ -17,6 +17,7 @@
 
 use super::lanes::{Lanes, Row};
 use crate::accel::WIDTH;
+use crate::geometry::Dimension;
 
 /// 20 half-ulps: the 13 of the facet values, those of the bound itself, and some to spare.
 const ROUNDING: f32 = 20.0 / (1 << 24) as f32;
@@ -200,7 +201,7 @@ pub(super) fn judge_once<L: Lanes, const D: usize>(edges: &[[L; D]; D], directio
         least = least.min(value);
         greatest = greatest.max(value);
     }
-    let bound = ROUNDING * if D == 3 { size * size } else { size * size * size } + UNDERFLOW;
+    let bound = ROUNDING * Dimension::of::<D>().pick(size * size, size * size * size) + UNDERFLOW;
     let unoriented = determinant.abs().less_or_equal(L::splat(bound * size + UNDERFLOW));
     let outside = least.less_or_equal(L::splat(-bound));
     let inside = !least.less_or_equal(L::splat(bound)) & !unoriented;
@@ -243,28 +244,31 @@ fn triple<L: Lanes>(a: [L; 3], m: [L; 3]) -> L {
 #[inline(always)]
 fn facet_normals<L: Lanes, const D: usize>(edges: &[[L; D]; D]) -> [[L; D]; D] {
     let mut normals = *edges;
-    if D == 3 {
-        for i in 0..3 {
-            let (a, b) = (&edges[(i + 1) % 3], &edges[(i + 2) % 3]);
-            for k in 0..3 {
-                let (p, q) = ((k + 1) % 3, (k + 2) % 3);
-                normals[i][k] = minor(a[p], a[q], b[p], b[q]);
+    match Dimension::of::<D>() {
+        Dimension::Three => {
+            for i in 0..3 {
+                let (a, b) = (&edges[(i + 1) % 3], &edges[(i + 2) % 3]);
+                for k in 0..3 {
+                    let (p, q) = ((k + 1) % 3, (k + 2) % 3);
+                    normals[i][k] = minor(a[p], a[q], b[p], b[q]);
+                }
             }
         }
-    } else {
-        // The 2 x 2 minors of the first two and of the last two edges serve two normals each.
-        let (first, last) = (minors(&edges[0], &edges[1]), minors(&edges[2], &edges[3]));
-        let zero = L::splat(0.0);
-        for i in 0..4 {
-            let (a, [xy, xz, xw, yz, yw, zw]) = (&edges[i ^ 1], if i < 2 { last } else { first });
-            let n = [
-                triple([a[1], a[2], a[3]], [zw, yw, yz]),
-                zero.sub(triple([a[0], a[2], a[3]], [zw, xw, xz])),
-                triple([a[0], a[1], a[3]], [yw, xw, xy]),
-                zero.sub(triple([a[0], a[1], a[2]], [yz, xz, xy])),
-            ];
-            for k in 0..4 {
-                normals[i][k] = if i % 2 == 0 { n[k] } else { zero.sub(n[k]) };
+        Dimension::Four => {
+            // The 2 x 2 minors of the first two and of the last two edges serve two normals each.
+            let (first, last) = (minors(&edges[0], &edges[1]), minors(&edges[2], &edges[3]));
+            let zero = L::splat(0.0);
+            for i in 0..4 {
+                let (a, [xy, xz, xw, yz, yw, zw]) = (&edges[i ^ 1], if i < 2 { last } else { first });
+                let n = [
+                    triple([a[1], a[2], a[3]], [zw, yw, yz]),
+                    zero.sub(triple([a[0], a[2], a[3]], [zw, xw, xz])),
+                    triple([a[0], a[1], a[3]], [yw, xw, xy]),
+                    zero.sub(triple([a[0], a[1], a[2]], [yz, xz, xy])),
+                ];
+                for k in 0..4 {
+                    normals[i][k] = if i % 2 == 0 { n[k] } else { zero.sub(n[k]) };
+                }
             }
         }
     }

@@ -7,7 +7,7 @@
 
 use super::lanes::Lanes;
 use crate::accel::WIDTH;
-use crate::geometry::{Frame, Vector};
+use crate::geometry::{Dimension, Frame, Vector};
 use crate::trace::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, scramble_reversed, sobol};
 
 /// Rays of a block; the bits of a `u64` name them.
@@ -83,11 +83,12 @@ impl<const D: usize> Rays<D> {
         match &mut sequence.source {
             Source::Random(_) => {
                 for i in 0..count {
-                    let point: [f32; 3] = if D == 4 {
-                        sequence.next_point()
-                    } else {
-                        let [a, b] = sequence.next_point();
-                        [a, b, 0.0]
+                    let point: [f32; 3] = match Dimension::of::<D>() {
+                        Dimension::Three => {
+                            let [a, b] = sequence.next_point();
+                            [a, b, 0.0]
+                        }
+                        Dimension::Four => sequence.next_point(),
                     };
                     (0..3).for_each(|d| points[d][i] = point[d]);
                 }
@@ -125,10 +126,9 @@ impl<const D: usize> Rays<D> {
             let mut local = [0.0f32; D];
             let (a, b, c) = (points[0][i], points[1][i], points[2][i]);
             let [x, y] = square_to_disk(a, b);
-            if D == 4 {
-                local[..3].copy_from_slice(&disk_to_ball(a, b, c, x, y));
-            } else {
-                (local[0], local[1]) = (x, y);
+            match Dimension::of::<D>() {
+                Dimension::Three => (local[0], local[1]) = (x, y),
+                Dimension::Four => local[..3].copy_from_slice(&disk_to_ball(a, b, c, x, y)),
             }
             let mut square = 0.0f32;
             for l in &local[..D - 1] {
@@ -259,12 +259,15 @@ fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize, number: &m
     let cell = |x: f32, cells: f32| ((x + 1.0) * (cells * 0.5)) as i32 as usize;
     let mut keys = [0u8; BLOCK];
     for i in 0..BLOCK {
-        keys[i] = if D == 4 {
-            let spread = |x: f32| SPREAD_3[cell(x, 4.0) % 4];
-            spread(points[0][i]) | spread(points[1][i]) << 1 | spread(points[2][i]) << 2
-        } else {
-            let spread = |x: f32| SPREAD_2[cell(x, 8.0) % 8];
-            spread(points[0][i]) | spread(points[1][i]) << 1
+        keys[i] = match Dimension::of::<D>() {
+            Dimension::Three => {
+                let spread = |x: f32| SPREAD_2[cell(x, 8.0) % 8];
+                spread(points[0][i]) | spread(points[1][i]) << 1
+            }
+            Dimension::Four => {
+                let spread = |x: f32| SPREAD_3[cell(x, 4.0) % 4];
+                spread(points[0][i]) | spread(points[1][i]) << 1 | spread(points[2][i]) << 2
+            }
         };
     }
     let mut ends = [0u8; BLOCK];

@@ -1,6 +1,7 @@
 //! What the simplices around a vertex hide of its own hemisphere.
 //!
-//! A simplex with a corner at the vertex hides the cone of its edges and -n ([`crate::trace::Surroundings`]). On a smooth surface
+//! A simplex with a corner at the vertex hides the cone of its edges and -n ([`crate::trace::Surroundings`]), or another
+//! vector where other faces or bodies meet it ([`crate::mesh::approach`]). On a smooth surface
 //! that is a sliver at the horizon: with s n for the part along the normal, a direction of the cone is
 //! w = sum mu_i e_i - s n, so its height over the tangent hyperplane is at most that of a vector in the simplex's own
 //! hyperplane, which is at most the sine of the angle between the two hyperplanes. Rays above all of these
@@ -25,12 +26,21 @@ pub(super) struct VertexStar<const D: usize> {
     /// Nothing is hidden above this height.
     height: f32,
     normal: Vector<D>,
+    /// From where the vertex is approached: the normal, or beside another face or body a way along the own one.
+    approach: Vector<D>,
     identity: u32,
 }
 
 impl<const D: usize> VertexStar<D> {
     pub fn new() -> Self {
-        Self { cones: Vec::new(), count: 0, height: -1.0, normal: Vector::zeros(), identity: 0 }
+        Self {
+            cones: Vec::new(),
+            count: 0,
+            height: -1.0,
+            normal: Vector::zeros(),
+            approach: Vector::zeros(),
+            identity: 0,
+        }
     }
 
     /// For a point with no simplex around it.
@@ -40,9 +50,15 @@ impl<const D: usize> VertexStar<D> {
 
     /// For a vertex, with the simplices around it.
     #[inline(always)]
-    pub fn set<L: Lanes>(&mut self, query: &Query<D>, normal: Vector<D>, identity: u32, around: &[u32]) {
+    pub fn set<L: Lanes>(
+        &mut self,
+        query: &Query<D>,
+        [normal, approach]: [Vector<D>; 2],
+        identity: u32,
+        around: &[u32],
+    ) {
         self.clear();
-        (self.normal, self.identity) = (normal, identity);
+        (self.normal, self.approach, self.identity) = (normal, approach, identity);
         for simplices in around.chunks(WIDTH) {
             if self.cones.len() == self.count {
                 self.cones.push(Cones::new());
@@ -50,6 +66,10 @@ impl<const D: usize> VertexStar<D> {
             let height = self.set_block::<L>(query, simplices);
             self.height = self.height.max(height);
             self.count += 1;
+        }
+        if approach != normal {
+            // Then the cones are as high as may be.
+            self.height = 1.0;
         }
     }
 
@@ -74,7 +94,7 @@ impl<const D: usize> VertexStar<D> {
         let (mut surely, mut maybe) = (L::splat(-1.0), L::splat(-1.0));
         for (i, edge) in edges.iter_mut().enumerate() {
             for k in 0..D {
-                edge[k] = if i < D - 1 { L::load(&rows[i][k]) } else { L::splat(-self.normal[k]) };
+                edge[k] = if i < D - 1 { L::load(&rows[i][k]) } else { L::splat(-self.approach[k]) };
             }
             if i < D - 1 {
                 let height = dot(edge, &normal);
@@ -134,7 +154,7 @@ impl<const D: usize> VertexStar<D> {
         let direction = query.ray(rays, i).direction;
         (simplices.iter().enumerate()).filter(|(lane, _)| doubtful >> lane & 1 == 1).any(|(_, &simplex)| {
             let mesh = query.tracer.mesh();
-            star_cone(mesh, query.position, self.normal, self.identity, simplex)
+            star_cone(mesh, query.position, [self.normal, self.approach], self.identity, simplex)
                 .is_some_and(|cone| cone.contains(&direction))
         })
     }

@@ -12,6 +12,7 @@ use super::traverse::Traversal;
 use super::x86::{Avx2, Avx512};
 use crate::accel::Tracer;
 use crate::geometry::{Frame, Ray, Vector};
+use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
 use crate::trace::cpu::scalar::estimate_at;
 use crate::trace::estimate::{Accumulator, Estimate};
@@ -37,7 +38,8 @@ enum Source<'a, const D: usize> {
 
 /// The vertex that the rays start from, if they do.
 struct AtVertex<'a, const D: usize> {
-    normal: Vector<D>,
+    /// Its normal, and from where it is approached.
+    ways: [Vector<D>; 2],
     identity: u32,
     /// The simplices that have it as a corner.
     around: &'a [u32],
@@ -89,7 +91,8 @@ impl<const D: usize> PacketTracer<D> {
         let vertex = match *point {
             ShadingPoint::Vertex(vertex) => {
                 let identity = mesh.identity[vertex as usize];
-                Some(AtVertex { normal, identity, around: tracer.incidence().around(identity) })
+                let around = tracer.incidence().around(identity);
+                Some(AtVertex { ways: [normal, approach(mesh, around, vertex)], identity, around })
             }
             ShadingPoint::Inside { .. } => None,
         };
@@ -180,7 +183,7 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
     let query = &query;
     let around = match &vertex {
         Some(at) => {
-            packets.star.set::<L>(query, at.normal, at.identity, at.around);
+            packets.star.set::<L>(query, at.ways, at.identity, at.around);
             at.around
         }
         None => {

@@ -1,0 +1,103 @@
+//! A scene in memory, ready to be shaded and looked at: the door for programs that bring their own meshes.
+//!
+//! A session owns its scene and shares it by `Arc`, so that whoever holds one, a program or a binding, has nothing to keep
+//! alive beside it. `examples/mesh_to_volume.rs` goes from a mesh to a volume in about thirty lines; `ao4d run` makes one
+//! session a scene.
+
+use std::sync::{Arc, OnceLock};
+
+use crate::accel::Tracer;
+use crate::mesh::Mesh;
+use crate::occlusion::{Error, Estimates, Estimator};
+use crate::progress::Progress;
+use crate::render::{Aov, Camera, Renderer, Shading};
+use crate::trace::cpu::CpuBackend;
+use crate::trace::opencl::{self, OpenCl, OpenClBackend};
+use crate::trace::{RayBackend, ShadingPoint};
+use crate::volume::Volume;
+
+/// A scene, and what traces rays in it.
+#[derive(Debug)]
+pub struct Session<const D: usize> {
+    tracer: Arc<Tracer<D>>,
+    hash: OnceLock<String>,
+    opencl: Option<Arc<OpenCl>>,
+    backend: OnceLock<Arc<dyn RayBackend<D>>>,
+}
+
+impl<const D: usize> Session<D> {
+    /// A scene whose rays are traced by the processor.
+    pub fn new(mesh: impl Into<Arc<Mesh<D>>>) -> Self {
+        let tracer = Arc::new(Tracer::new(mesh));
+        Self { tracer, hash: OnceLock::new(), opencl: None, backend: OnceLock::new() }
+    }
+
+    /// A scene whose rays are traced by OpenCL devices, which get it when they are first asked to.
+    pub fn on(mesh: impl Into<Arc<Mesh<D>>>, opencl: Arc<OpenCl>) -> Self {
+        Self { opencl: Some(opencl), ..Self::new(mesh) }
+    }
+
+    /// The scene's mesh.
+    pub fn mesh(&self) -> &Arc<Mesh<D>> {
+        self.tracer.mesh()
+    }
+
+    /// The hash of the mesh's content.
+    pub fn mesh_hash(&self) -> &str {
+        self.hash.get_or_init(|| self.mesh().content_hash())
+    }
+
+    /// What traces rays.
+    ///
+    /// # Errors
+    /// If the scene doesn't fit on the device.
+    pub fn backend(&self) -> Result<&Arc<dyn RayBackend<D>>, opencl::Error> {
+        if let (None, Some(opencl)) = (self.backend.get(), &self.opencl) {
+            let device = OpenClBackend::new(opencl, Arc::clone(&self.tracer))?;
+            let _ = self.backend.set(Arc::new(device));
+        }
+        Ok(self.backend.get_or_init(|| Arc::new(CpuBackend::new(Arc::clone(&self.tracer)))))
+    }
+
+    /// Ambient occlusion at the vertices. If there is a `mask`, only where it says so; elsewhere values are 1.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where a closed form is too expensive, and what goes
+    /// wrong on a device.
+    pub fn occlusion(
+        &self,
+        estimator: Estimator,
+        mask: Option<&[bool]>,
+        progress: &dyn Progress,
+    ) -> Result<Estimates, Error> {
+        estimator.estimate(&**self.backend()?, &ShadingPoint::vertices(self.mesh()), mask, progress)
+    }
+
+    /// A picture to be made slab by slab.
+    ///
+    /// # Errors
+    /// If the scene doesn't fit on the device.
+    pub fn renderer(
+        &self,
+        camera: Camera<D>,
+        dimensions: [usize; 3],
+        shading: Shading,
+    ) -> Result<Renderer<D>, opencl::Error> {
+        Ok(Renderer::new(Arc::clone(self.backend()?), camera, dimensions, shading))
+    }
+
+    /// A whole picture in memory, with these arrays.
+    ///
+    /// # Errors
+    /// As [`Session::occlusion`].
+    pub fn render(
+        &self,
+        camera: Camera<D>,
+        dimensions: [usize; 3],
+        shading: Shading,
+        aovs: &[Aov],
+        progress: &dyn Progress,
+    ) -> Result<Volume, Error> {
+        self.renderer(camera, dimensions, shading)?.volume(aovs, progress)
+    }
+}

@@ -1,0 +1,293 @@
+//! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`.
+//!
+//! A stage's file holds all there is to know of it: what is written in YAML (its `Spec`), what is understood of that
+//! (its `Plan`: checked, resolved, every default filled in), its part of the key that tells whether a file is fresh, its
+//! line in `ao4d check`, how it is run, and which files it leaves. [`Stage`] is the list of these; the rows at the end of
+//! this page are the index. A new stage is one file and one row.
+//!
+//! A [`Plan`] is plain numbers and names. Stages refer to each other by [`Ref`], so nothing that runs a plan looks anything
+//! up, and whatever is wrong with a pipeline by itself has been refused before. (What depends on the contents of files, such
+//! as a mesh's vertex indices, is checked where they are read.)
+//!
+//! Which stage works on which:
+//! - an `occlusion` works on a scene;
+//! - a `render` works on a scene, and is darkened by an occlusion of that scene. Named by `input` or `occlusion`, or
+//!   the nearest earlier of each. If these two don't belong together, the plan asks instead of guessing;
+//! - a `write` works on a render;
+//! - a `paraview` figure works on writes, and finds them also by the name of their render.
+
+pub mod camera;
+pub mod cut;
+pub mod describe;
+mod error;
+pub mod key;
+mod names;
+pub mod occlusion;
+mod one_or_many;
+pub mod paraview;
+mod plan;
+pub mod prepare;
+mod range;
+pub mod render;
+mod resolve;
+mod run;
+pub mod scene;
+pub(crate) mod suggest;
+pub mod write;
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+pub use describe::{Counts, Totals};
+pub use error::{Invalid, StageError};
+pub use key::{Keys, LeftOut, Output};
+pub use one_or_many::OneOrMany;
+pub use plan::{Plan, Planned, Ref};
+pub use resolve::Resolver;
+pub use run::{Ledger, Made, Run, SceneRun};
+
+/// Coordinates and lengths beyond this are refused: their squares must stay far inside `f32`.
+pub const MAX_LENGTH: f64 = 1e12;
+/// No length that must be above zero may be below this.
+pub const MIN_LENGTH: f64 = 1e-12;
+
+/// What every kind of stage says of itself.
+pub trait Stage: plan::OfKind + Serialize {
+    /// What is written in YAML.
+    type Spec;
+    /// The kind, as the pipeline's text names it.
+    const KIND: &'static str;
+    /// What `ao4d check --json` calls the list of these.
+    const LIST: &'static str;
+    /// The fields that its key leaves out, each with the reason why no byte of a result depends on it.
+    const LEFT_OUT: &'static [LeftOut];
+
+    /// The id, where one is written.
+    fn id(spec: &Self::Spec) -> Option<&str>;
+
+    /// Checks what is written at `path`, fills in defaults, finds what it works on, and claims the names of its files.
+    ///
+    /// # Errors
+    /// Whatever can be refused without reading inputs.
+    fn resolve(spec: &Self::Spec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid>;
+
+    /// What is allowed but probably not meant, once all stages are known.
+    fn unused(_me: Ref<Self>, _plan: &Plan) -> Option<&'static str> {
+        None
+    }
+
+    /// The stages whose results it works on, by their places in the plan.
+    fn works_on(&self) -> Vec<usize>;
+
+    /// The scene that it is about; none if it works on files alone, and runs after all scenes.
+    fn scene(me: Ref<Self>, plan: &Plan) -> Option<Ref<scene::ScenePlan>>;
+
+    /// The files it reads. Those that needn't exist are among them.
+    fn input_files(&self, _plan: &Plan) -> Vec<PathBuf> {
+        Vec::new()
+    }
+
+    /// What else decides its result, beside its own fields, what it works on, and the files it reads.
+    fn depends_on(_me: Ref<Self>, _plan: &Plan) -> Value {
+        Value::Null
+    }
+
+    /// The files that it names, below the output folder.
+    fn files(&self) -> Vec<&Path> {
+        Vec::new()
+    }
+
+    /// Files that it may leave beside those, under names that follow from theirs.
+    fn files_beside(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
+
+    /// The files that it leaves and the cache knows, each with its key.
+    fn outputs(_me: Ref<Self>, _plan: &Plan, _keys: &Keys) -> Vec<Output> {
+        Vec::new()
+    }
+
+    /// The memory that it takes at once and the bytes that it leaves, given which files have to be made.
+    fn needs(_me: Ref<Self>, _plan: &Plan, _stale: &dyn Fn(&Path) -> bool) -> Needs {
+        Needs::default()
+    }
+
+    /// Its line in `ao4d check`, without kind and id.
+    fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String;
+
+    /// Its part of the sums over all stages.
+    fn totals(_me: Ref<Self>, _plan: &Plan, _counts: &[Counts]) -> Totals {
+        Totals::default()
+    }
+
+    /// Makes its fields what `ao4d check --json` shows of them.
+    fn show(_fields: &mut Map<String, Value>) {}
+
+    /// Makes those of its files that have to be made, in the scene that it is about. Returns what is worth telling of
+    /// the work, such as its speed.
+    ///
+    /// # Errors
+    /// [`StageError`]
+    fn run<const D: usize>(_me: Ref<Self>, _run: &mut Run, _scene: &mut SceneRun<D>) -> Result<String, StageError> {
+        Ok(String::new())
+    }
+
+    /// The same for a stage that is about no scene.
+    ///
+    /// # Errors
+    /// [`StageError`]
+    fn run_last(_me: Ref<Self>, _run: &mut Run) -> Result<String, StageError> {
+        Ok(String::new())
+    }
+}
+
+/// What a stage takes of the computer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Bytes of memory at once, at the least.
+    pub memory: u64,
+    /// Bytes of large files, where they are known before.
+    pub disk: u64,
+}
+
+/// Builds the index from its rows: a name, what is written, what is understood.
+macro_rules! stages {
+    ($($(#[$doc:meta])+ $name:ident: $spec:ty => $plan:ty;)+) => {
+        /// One stage: its kind, and its settings.
+        #[derive(Clone, Debug, Deserialize, JsonSchema)]
+        #[serde(rename_all = "snake_case")]
+        pub enum StageSpec {
+            $($(#[$doc])+ $name($spec),)+
+        }
+
+        /// One stage as understood.
+        #[derive(Clone, Debug, Serialize)]
+        #[serde(untagged)]
+        pub enum StagePlan {
+            $($(#[$doc])+ $name($plan),)+
+        }
+
+        /// The kinds of stage, as the pipeline's text names them.
+        pub const KINDS: &[&str] = &[$(<$plan>::KIND),+];
+
+        /// What `ao4d check --json` calls the lists of them.
+        const LISTS: &[(&str, &str)] = &[$((<$plan>::KIND, <$plan>::LIST)),+];
+
+        impl StageSpec {
+            /// The kind, as the pipeline's text names it.
+            pub fn kind(&self) -> &'static str {
+                match self { $(Self::$name(_) => <$plan>::KIND),+ }
+            }
+
+            /// The id, where one is written.
+            pub fn id(&self) -> Option<&str> {
+                match self { $(Self::$name(spec) => <$plan>::id(spec)),+ }
+            }
+
+            fn resolve(&self, path: &str, resolver: &mut Resolver) -> Result<StagePlan, Invalid> {
+                Ok(match self { $(Self::$name(spec) => StagePlan::$name(<$plan>::resolve(spec, path, resolver)?)),+ })
+            }
+        }
+
+        /// Each of these does what the method of [`Stage`] with its name does, for the stage at this place of a plan.
+        #[allow(missing_docs, clippy::missing_errors_doc)]
+        impl Plan {
+            pub fn kind(&self, index: usize) -> &'static str {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::KIND),+ }
+            }
+
+            pub fn left_out(&self, index: usize) -> &'static [LeftOut] {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::LEFT_OUT),+ }
+            }
+
+            pub fn unused(&self, index: usize) -> Option<&'static str> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::unused(self.at(index), self)),+ }
+            }
+
+            pub fn works_on(&self, index: usize) -> Vec<usize> {
+                match &self.stages[index].plan { $(StagePlan::$name(plan) => plan.works_on()),+ }
+            }
+
+            pub fn scene_of(&self, index: usize) -> Option<Ref<scene::ScenePlan>> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::scene(self.at(index), self)),+ }
+            }
+
+            pub fn input_files(&self, index: usize) -> Vec<PathBuf> {
+                match &self.stages[index].plan { $(StagePlan::$name(plan) => plan.input_files(self)),+ }
+            }
+
+            fn depends_on(&self, index: usize) -> Value {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::depends_on(self.at(index), self)),+ }
+            }
+
+            pub fn files_of(&self, index: usize) -> Vec<&Path> {
+                match &self.stages[index].plan { $(StagePlan::$name(plan) => plan.files()),+ }
+            }
+
+            pub fn files_beside(&self, index: usize) -> Vec<PathBuf> {
+                match &self.stages[index].plan { $(StagePlan::$name(plan) => plan.files_beside()),+ }
+            }
+
+            pub fn outputs(&self, index: usize, keys: &Keys) -> Vec<Output> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::outputs(self.at(index), self, keys)),+ }
+            }
+
+            pub fn needs(&self, index: usize, stale: &dyn Fn(&Path) -> bool) -> Needs {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::needs(self.at(index), self, stale)),+ }
+            }
+
+            fn line(&self, index: usize, counts: &[Counts]) -> String {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::line(self.at(index), self, counts)),+ }
+            }
+
+            fn totals_of(&self, index: usize, counts: &[Counts]) -> Totals {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::totals(self.at(index), self, counts)),+ }
+            }
+
+            fn show(&self, index: usize, fields: &mut Map<String, Value>) {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::show(fields)),+ }
+            }
+
+            pub fn run<const D: usize>(
+                &self,
+                index: usize,
+                run: &mut Run,
+                scene: &mut SceneRun<D>,
+            ) -> Result<String, StageError> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::run(self.at(index), run, scene)),+ }
+            }
+
+            pub fn run_last(&self, index: usize, run: &mut Run) -> Result<String, StageError> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::run_last(self.at(index), run)),+ }
+            }
+        }
+
+        $(impl plan::OfKind for $plan {
+            fn of_kind(stage: &StagePlan) -> Option<&Self> {
+                #[allow(unreachable_patterns)]
+                match stage { StagePlan::$name(plan) => Some(plan), _ => None }
+            }
+
+            fn of_kind_mut(stage: &mut StagePlan) -> Option<&mut Self> {
+                #[allow(unreachable_patterns)]
+                match stage { StagePlan::$name(plan) => Some(plan), _ => None }
+            }
+        })+
+    };
+}
+
+stages! {
+    /// Objects in space.
+    Scene: scene::SceneSpec => scene::ScenePlan;
+    /// Ambient occlusion at the vertices of a scene.
+    Occlusion: occlusion::OcclusionSpec => occlusion::OcclusionPlan;
+    /// An image of a scene.
+    Render: render::RenderSpec => render::RenderPlan;
+    /// Files of an image.
+    Write: write::WriteSpec => write::WritePlan;
+    /// A ParaView state that shows images.
+    Paraview: paraview::ParaviewSpec => paraview::FigurePlan;
+}

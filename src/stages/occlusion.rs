@@ -1,0 +1,564 @@
+//! `occlusion`: ambient occlusion at the vertices of a scene, computed or read from a file.
+//!
+//! Values are computed when some file that has to be made needs them, and then only at vertices that some image shows,
+//! unless a file wants them all. `NAME.f32` has the values, `NAME.f32.yaml` says what they are, and `NAME.error.f32` has
+//! their standard errors, where the method has any.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use super::describe::{Counts, Totals, grouped};
+use super::key::without;
+use super::prepare::{Loaded, errors_path, kept, sidecar_path};
+use super::range::positive;
+use super::render::{self, RenderPlan};
+use super::scene::{MISSING, ScenePlan};
+use super::write::{self, PROGRAM, WritePlan, write_whole};
+use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use crate::io;
+use crate::occlusion::exact::{self, Budget};
+use crate::occlusion::{self, Deviations, Estimates, Estimator, ProgramDeviations, Sidecar};
+use crate::text::number;
+use crate::trace::{Sampler, Sampling, Target};
+
+/// The most samples a vertex.
+pub const MAX_SAMPLES: u64 = 1 << 24;
+/// The most pieces that a vertex's view may be cut into.
+pub const MAX_CONES: u64 = 1_000_000_000;
+
+/// Ambient occlusion at the vertices of a scene: 1 is open, 0 fully occluded.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct OcclusionSpec {
+    /// A name for later stages to refer to.
+    pub id: Option<String>,
+    /// The scene, by its id.
+    pub input: Option<String>,
+    /// How it is computed (default `sobol`).
+    pub method: Option<Method>,
+    /// Rays a vertex (default 256); powers of two suit `sobol` best.
+    #[schemars(range(min = 1, max = 16777216))]
+    pub samples: Option<u64>,
+    /// Instead of `samples`: take rays until the estimated error is below this.
+    pub target_error: Option<f64>,
+    /// With `target_error`: at most so many rays a vertex (default 65536).
+    #[schemars(range(min = 1, max = 16777216))]
+    pub max_samples: Option<u64>,
+    /// With `exact`: at most so many convex pieces a vertex, of a microsecond each (default 10000000).
+    #[schemars(range(min = 1, max = 1000000000))]
+    pub max_cones: Option<u64>,
+    /// Occluders further away than this don't count (default: all count); not with `exact`.
+    pub max_distance: Option<f64>,
+    /// Writes the values into this file, `NAME.f32`.
+    pub file: Option<String>,
+    /// Takes the values from this file, relative to the pipeline's folder, instead of computing them.
+    pub load: Option<String>,
+    /// Instead of the pipeline's seed.
+    pub seed: Option<u64>,
+}
+
+/// How ambient occlusion is computed.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Owen-scrambled Sobol points, cosine-weighted.
+    #[default]
+    Sobol,
+    /// Independent random rays, cosine-weighted.
+    Random,
+    /// In closed form where few simplices are to be seen, by Sobol points elsewhere.
+    Adaptive,
+    /// In closed form, without sampling noise.
+    Exact,
+    /// As the thesis published it, slips and all, for its figures.
+    AsPublished,
+    /// As the thesis's program did it, which is not what its text says, for its figures.
+    AsProgrammed,
+}
+
+/// Ambient occlusion at a scene's vertices, as understood.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OcclusionPlan {
+    /// The scene it is of.
+    pub scene: Ref<ScenePlan>,
+    /// Where the values come from.
+    pub source: OcclusionSource,
+    /// The file they are written to, below `out`.
+    pub file: Option<PathBuf>,
+}
+
+/// Where occlusion comes from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OcclusionSource {
+    /// It is computed.
+    Compute(Computation),
+    /// It is read from a file, which existed when the plan was made.
+    Load(#[serde(serialize_with = "super::describe::path")] PathBuf),
+}
+
+/// How occlusion is computed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Computation {
+    /// By which method.
+    pub method: Method,
+    /// With how many rays.
+    pub samples: Samples,
+    /// For `exact`: the most convex pieces a vertex.
+    pub max_cones: u64,
+    /// Occluders further away don't count.
+    pub max_distance: Option<f64>,
+    /// What its random numbers start from.
+    pub seed: u64,
+}
+
+/// How many rays a vertex sends.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Samples {
+    /// None: the method is exact.
+    Exact,
+    /// So many.
+    Fixed(u64),
+    /// As many as bring the estimated error below a bound.
+    Target {
+        /// The bound.
+        error: f64,
+        /// At most so many.
+        max_samples: u64,
+    },
+}
+
+impl Stage for OcclusionPlan {
+    type Spec = OcclusionSpec;
+    const KIND: &'static str = "occlusion";
+    const LIST: &'static str = "occlusions";
+    const LEFT_OUT: &'static [LeftOut] = &[
+        LeftOut::new("/scene", "the key of the scene itself takes part"),
+        LeftOut::new("/file", "values don't depend on where they are kept"),
+        LeftOut::new("/source/load", "the content of the file takes part"),
+        LeftOut::new("/source/compute/max_cones", "a bound on the work: within it values don't depend on it"),
+    ];
+
+    fn id(spec: &OcclusionSpec) -> Option<&str> {
+        spec.id.as_deref()
+    }
+
+    fn resolve(spec: &OcclusionSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
+        let scene = resolver.input(path, spec.input.as_deref(), MISSING)?;
+        // Checked also beside `load`, so that taking `load` out reveals no new mistakes.
+        let computation = computation(path, spec, resolver)?;
+        let source = match &spec.load {
+            None => OcclusionSource::Compute(computation),
+            Some(name) => {
+                let key = format!("{path}.load");
+                let file = resolver.plan.folder.join(name);
+                match crate::input::length(&file) {
+                    Ok(_) if !name.is_empty() => {}
+                    Err(cause) if file.exists() => {
+                        return Err(Invalid::new(key, format!("can't read {}: {cause}", file.display())));
+                    }
+                    _ => return Err(Invalid::new(key, format!("there is no file {}", file.display()))),
+                }
+                let unused: Vec<&str> = written(spec).collect();
+                if !unused.is_empty() {
+                    resolver
+                        .warn(&key, format!("the values come from the file, so {} has no effect", unused.join(", ")));
+                }
+                OcclusionSource::Load(file)
+            }
+        };
+        let file = match &spec.file {
+            None => None,
+            Some(name) => {
+                let key = format!("{path}.file");
+                let file = resolver.outputs.claim(&key, name, Some("f32"))?;
+                for beside in [sidecar_path(&file), errors_path(&file)] {
+                    resolver.outputs.claim(&key, &beside.to_string_lossy(), None)?;
+                }
+                Some(file)
+            }
+        };
+        Ok(Self { scene, source, file })
+    }
+
+    fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
+        let used = plan.all::<RenderPlan>().any(|(_, render)| render.occlusion == Some(me));
+        (!used && plan[me].file.is_none()).then_some("no render uses this occlusion and no `file` keeps it")
+    }
+
+    fn works_on(&self) -> Vec<usize> {
+        vec![self.scene.index()]
+    }
+
+    fn scene(me: Ref<Self>, plan: &Plan) -> Option<Ref<ScenePlan>> {
+        Some(plan[me].scene)
+    }
+
+    fn input_files(&self, _: &Plan) -> Vec<PathBuf> {
+        match &self.source {
+            OcclusionSource::Load(file) => vec![file.clone(), sidecar_path(file), errors_path(file)],
+            OcclusionSource::Compute(_) => Vec::new(),
+        }
+    }
+
+    fn files(&self) -> Vec<&Path> {
+        self.file.iter().map(PathBuf::as_path).collect()
+    }
+
+    fn files_beside(&self) -> Vec<PathBuf> {
+        self.file.iter().flat_map(|file| [sidecar_path(file), errors_path(file)]).collect()
+    }
+
+    fn outputs(me: Ref<Self>, plan: &Plan, keys: &Keys) -> Vec<Output> {
+        let Some(file) = &plan[me].file else { return Vec::new() };
+        let beside = std::iter::once(sidecar_path(file)).chain(plan[me].errors_file()).collect();
+        vec![Output { file: file.clone(), beside, key: keys.of(me.index()).to_owned() }]
+    }
+
+    fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String {
+        let how = match &plan[me].source {
+            OcclusionSource::Load(file) => format!("from {}", file.display()),
+            OcclusionSource::Compute(computation) => {
+                let method = computation.method.as_str();
+                match computation.samples {
+                    Samples::Exact => method.to_owned(),
+                    Samples::Fixed(n) => format!("{method}, {} samples a vertex", grouped(n)),
+                    Samples::Target { error, max_samples } => {
+                        format!("{method}, error below {error}, at most {} samples a vertex", grouped(max_samples))
+                    }
+                }
+            }
+        };
+        let rays = rays(me, plan, counts).filter(|&n| n > 0).map(|n| format!(", {} rays", grouped(n)));
+        let file = plan[me].file.as_ref().map(|file| format!(" -> {}", file.display()));
+        format!("of {}: {how}{}{}", plan.id(plan[me].scene), rays.unwrap_or_default(), file.unwrap_or_default())
+    }
+
+    fn totals(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> Totals {
+        Totals { occlusion_rays: rays(me, plan, counts), ..Totals::default() }
+    }
+
+    fn show(fields: &mut Map<String, Value>) {
+        if let Some(Value::Object(computation)) = fields["source"].get_mut("compute") {
+            computation.shift_remove("max_cones");
+        }
+    }
+
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+        let plan = run.plan;
+        let Some(file) = plan[me].file.as_deref() else { return Ok(String::new()) };
+        if !run.is_stale(file) {
+            return Ok("as it was".to_owned());
+        }
+        let start = Instant::now();
+        values(me, run, scene)?;
+        let found = Arc::clone(&scene.values[&me]);
+        let detail = rate(&found, start);
+        let sidecar = match (&plan[me].source, run.loaded.get(&me)) {
+            (OcclusionSource::Compute(computation), _) => sidecar(&found, computation, scene.session.mesh_hash()),
+            (OcclusionSource::Load(_), Some(loaded)) => loaded.sidecar.clone(),
+            (OcclusionSource::Load(_), None) => return Ok(String::new()),
+        };
+        // The values last: they are what others look for.
+        match plan[me].errors_file() {
+            Some(errors) => {
+                let bytes = write_whole(&plan.out.join(&errors), &occlusion::encode(&found.errors))?;
+                run.made_beside(&errors, bytes)?;
+            }
+            None => remove(run, &errors_path(file))?,
+        }
+        let beside = sidecar_path(file);
+        let bytes = write_whole(&plan.out.join(&beside), sidecar.to_yaml().as_bytes())?;
+        run.made_beside(&beside, bytes)?;
+        let bytes = write_whole(&plan.out.join(file), &occlusion::encode(&found.values))?;
+        run.made(file, bytes, Vec::new())?;
+        Ok(detail)
+    }
+}
+
+/// Takes away what an earlier run left and this one has none of, such as the errors of another method.
+fn remove(run: &mut Run, file: &Path) -> Result<(), StageError> {
+    let path = run.plan.out.join(file);
+    match std::fs::remove_file(&path) {
+        Ok(()) => Ok(run.ledger.forget(file)?),
+        Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(cause) => Err(io::Error::File { path, action: "be removed", cause }.into()),
+    }
+}
+
+impl OcclusionPlan {
+    /// Where the standard errors of the values are kept: in `NAME.error.f32` beside `NAME.f32`. None if there is no file,
+    /// or no error.
+    fn errors_file(&self) -> Option<PathBuf> {
+        let known = match &self.source {
+            OcclusionSource::Compute(computation) => computation.samples != Samples::Exact,
+            OcclusionSource::Load(file) => errors_path(file).is_file(),
+        };
+        self.file.as_ref().filter(|_| known).map(|file| errors_path(file))
+    }
+}
+
+/// Rays of an occlusion, where they are known: at most so many for a target error.
+fn rays(me: Ref<OcclusionPlan>, plan: &Plan, counts: &[Counts]) -> Option<u64> {
+    let vertices = counts.get(plan[me].scene.nth())?.vertices;
+    let each = match &plan[me].source {
+        OcclusionSource::Load(_) => 0,
+        OcclusionSource::Compute(computation) => match computation.samples {
+            Samples::Exact => 0,
+            Samples::Fixed(n) | Samples::Target { max_samples: n, .. } => n,
+        },
+    };
+    Some(vertices.saturating_mul(each))
+}
+
+/// Makes sure that an occlusion's values are known.
+///
+/// # Errors
+/// If they can't be computed, or Ctrl-C was pressed.
+pub fn values<const D: usize>(
+    me: Ref<OcclusionPlan>,
+    run: &mut Run,
+    scene: &mut SceneRun<D>,
+) -> Result<(), StageError> {
+    if scene.values.contains_key(&me) {
+        return Ok(());
+    }
+    let plan = run.plan;
+    let values = match &plan[me].source {
+        OcclusionSource::Load(_) => {
+            let take = |l: &mut Loaded| (std::mem::take(&mut l.values), std::mem::take(&mut l.errors));
+            let (values, errors) = run.loaded.get_mut(&me).map(take).unwrap_or_default();
+            Estimates { values, errors, rays: 0 }
+        }
+        OcclusionSource::Compute(computation) => {
+            // A file that is still fresh holds the values already.
+            let file = plan[me].file.as_deref().filter(|file| !run.is_stale(file));
+            match file.and_then(|file| {
+                kept(&plan.out.join(file), scene.session.mesh_hash(), scene.session.mesh().vertices.len())
+            }) {
+                Some(found) => found,
+                None => {
+                    let start = Instant::now();
+                    let found = compute(me, computation, run, scene)?;
+                    let known = run.early.entry(me.index()).or_default();
+                    known.1 = rate(&found, start);
+                    found
+                }
+            }
+        }
+    };
+    scene.values.insert(me, Arc::new(values));
+    Ok(())
+}
+
+fn compute<const D: usize>(
+    me: Ref<OcclusionPlan>,
+    computation: &Computation,
+    run: &Run,
+    scene: &SceneRun<D>,
+) -> Result<Estimates, StageError> {
+    let mask = mask(me, computation, run, scene)?;
+    let count = scene.session.mesh().vertices.len();
+    let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
+    let _running = run.progress.stage(&format!("occlusion {}", run.plan.id(me)), asked as u64);
+    Ok(scene.session.occlusion(computation.estimator(), mask.as_deref(), run.progress)?)
+}
+
+/// The vertices of the simplices that some voxel shows, of the pictures that have to be made; none if all values are
+/// wanted for some file, or if looking costs more than it may save.
+fn mask<const D: usize>(
+    me: Ref<OcclusionPlan>,
+    computation: &Computation,
+    run: &Run,
+    scene: &SceneRun<D>,
+) -> Result<Option<Vec<bool>>, StageError> {
+    let plan = run.plan;
+    let shown = plan.all::<WritePlan>().any(|(_, write)| {
+        plan[write.render].occlusion == Some(me) && !write.stale(write::Content::Mesh, &|f| run.is_stale(f)).is_empty()
+    });
+    if shown || plan[me].file.is_some() {
+        return Ok(None);
+    }
+    let mut left = computation.most_rays().saturating_mul(scene.session.mesh().vertices.len() as u64) / 4;
+    let mut mask = vec![false; scene.session.mesh().vertices.len()];
+    for (stage, render) in plan.all::<RenderPlan>() {
+        let values = render.occlusion == Some(me) && render.shading != render::Shading::Voxel;
+        if values && render::is_stale(stage, plan, &|file| run.is_stale(file)) {
+            let seen = render::mark_seen(stage, run, scene, &mut left, &mut mask)?;
+            if !seen {
+                return Ok(None);
+            }
+        }
+    }
+    Ok(Some(mask))
+}
+
+/// How fast values were found since then.
+fn rate(found: &Estimates, start: Instant) -> String {
+    let rays = match found.rays {
+        0 => String::new(),
+        rays => {
+            let speed = rays as f64 / start.elapsed().as_secs_f64() / 1e6;
+            format!("{} rays, {speed:.2} million a second, ", grouped(rays))
+        }
+    };
+    match found.errors.len() {
+        0 => rays,
+        _ => format!("{rays}error {:.1e}", found.error()),
+    }
+}
+
+/// The keys about computing that are written.
+fn written(spec: &OcclusionSpec) -> impl Iterator<Item = &'static str> {
+    [
+        ("method", spec.method.is_some()),
+        ("samples", spec.samples.is_some()),
+        ("target_error", spec.target_error.is_some()),
+        ("max_samples", spec.max_samples.is_some()),
+        ("max_cones", spec.max_cones.is_some()),
+        ("max_distance", spec.max_distance.is_some()),
+        ("seed", spec.seed.is_some()),
+    ]
+    .into_iter()
+    .filter_map(|(key, given)| given.then_some(key))
+}
+
+fn computation(path: &str, spec: &OcclusionSpec, resolver: &mut Resolver) -> Result<Computation, Invalid> {
+    let refuse = |key: &str, message: String| Err(Invalid::new(format!("{path}.{key}"), message));
+    let method = spec.method.unwrap_or_default();
+    let count = |key: &str, n: u64| match n {
+        1..=MAX_SAMPLES => Ok(n),
+        _ => refuse(key, format!("expected 1 to {MAX_SAMPLES} samples, found {n}")).map(|_: Computation| 0),
+    };
+    let samples = match (spec.samples, spec.target_error) {
+        (Some(_), Some(_)) => return refuse("target_error", "stands beside `samples`; give one of the two".into()),
+        (Some(n), None) => Samples::Fixed(count("samples", n)?),
+        (None, None) => Samples::Fixed(256),
+        (None, Some(error)) => {
+            if !(error > 0.0 && error < 1.0) {
+                let error = number(error);
+                return refuse("target_error", format!("expected an error above 0 and below 1, found {error}"));
+            }
+            Samples::Target { error, max_samples: count("max_samples", spec.max_samples.unwrap_or(65_536))? }
+        }
+    };
+    if let (Some(n), Samples::Fixed(_)) = (spec.max_samples, samples) {
+        count("max_samples", n)?;
+        resolver.warn(format!("{path}.max_samples"), "has no effect without `target_error`");
+    }
+    let samples = if method == Method::Exact {
+        if spec.samples.is_some() || spec.target_error.is_some() {
+            resolver.warn(path, "`exact` takes no samples, so `samples` and `target_error` have no effect");
+        }
+        Samples::Exact
+    } else {
+        samples
+    };
+    if method.is_of_the_thesis() && spec.target_error.is_some() {
+        let method = method.as_str();
+        return refuse("target_error", format!("`{method}` aims at no error, which it doesn't know; give `samples`"));
+    }
+    let max_cones = match spec.max_cones {
+        None => exact::Budget::default().cones as u64,
+        Some(n @ 1..=MAX_CONES) => n,
+        Some(n) => return refuse("max_cones", format!("expected 1 to {MAX_CONES} cones, found {n}")),
+    };
+    if spec.max_cones.is_some() && method != Method::Exact {
+        resolver.warn(format!("{path}.max_cones"), "has no effect without `method: exact`");
+    }
+    if spec.max_distance.is_some() && matches!(method, Method::Exact | Method::Adaptive | Method::AsProgrammed) {
+        let method = method.as_str();
+        return refuse(
+            "max_distance",
+            format!("`{method}` counts hits at all distances; leave this out, or use `method: sobol`"),
+        );
+    }
+    let distance = spec.max_distance.map(|d| positive(&format!("{path}.max_distance"), d));
+    let seed = spec.seed.unwrap_or(resolver.plan.seed);
+    Ok(Computation { method, samples, max_cones, max_distance: distance.transpose()?, seed })
+}
+
+impl Method {
+    /// As the pipeline names it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Method::Sobol => "sobol",
+            Method::Random => "random",
+            Method::Adaptive => "adaptive",
+            Method::Exact => "exact",
+            Method::AsPublished => "as_published",
+            Method::AsProgrammed => "as_programmed",
+        }
+    }
+
+    /// Whether it is there for the thesis's figures alone.
+    pub fn is_of_the_thesis(self) -> bool {
+        matches!(self, Method::AsPublished | Method::AsProgrammed)
+    }
+}
+
+impl Computation {
+    /// What computes the values.
+    pub fn estimator(&self) -> Estimator {
+        let (samples, target) = match self.samples {
+            Samples::Fixed(n) => (n, None),
+            Samples::Target { error, max_samples } => (max_samples, Some(Target { error: error as f32 })),
+            Samples::Exact => return Estimator::Exact(Budget { cones: self.max_cones as usize }),
+        };
+        let sampling = Sampling {
+            sampler: if self.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
+            samples: u32::try_from(samples).unwrap_or(u32::MAX),
+            seed: self.seed,
+            max_distance: self.max_distance.map_or(f32::INFINITY, |d| d as f32),
+            target,
+        };
+        match self.method {
+            Method::Adaptive => Estimator::Adaptive(sampling),
+            Method::AsPublished => Estimator::AsPublished(sampling, Deviations::PUBLISHED),
+            Method::AsProgrammed => Estimator::AsProgrammed(sampling, ProgramDeviations::PROGRAMMED),
+            _ => Estimator::Sampled(sampling),
+        }
+    }
+
+    /// The most rays that a vertex takes; the closed form counts as a few thousand, which is what it takes as long as.
+    fn most_rays(&self) -> u64 {
+        match self.samples {
+            Samples::Fixed(n) | Samples::Target { max_samples: n, .. } => n,
+            Samples::Exact => 1 << 12,
+        }
+    }
+
+    /// What images tell of it.
+    pub fn told(&self) -> Value {
+        without(json!(self), &[LeftOut::new("/max_cones", "no value depends on it")])
+    }
+}
+
+/// What is known about values that were computed.
+fn sidecar(found: &Estimates, computation: &Computation, mesh_hash: &str) -> Sidecar {
+    let Computation { method, samples, max_distance, seed, .. } = computation;
+    let (most, target_error) = match *samples {
+        Samples::Fixed(n) => (Some(n), None),
+        Samples::Target { error, max_samples } => (Some(max_samples), Some(error)),
+        Samples::Exact => (None, None),
+    };
+    let count = found.values.len();
+    Sidecar {
+        count,
+        method: method.as_str().to_owned(),
+        samples: most.and_then(|n| u32::try_from(n).ok()),
+        target_error,
+        mean_samples: most.map(|_| found.rays as f64 / count.max(1) as f64),
+        seed: *seed,
+        max_distance: max_distance.map_or(f32::INFINITY, |d| d as f32),
+        error_estimate: found.error(),
+        mesh: mesh_hash.to_owned(),
+        program: PROGRAM.to_owned(),
+    }
+}

@@ -1,0 +1,474 @@
+//! `render`: an image of a scene, from where, how large, and darkened by which occlusion.
+//!
+//! A picture is made when some file of it has to be, slab by slab, and goes to all its files at once, so none is ever in
+//! memory as a whole.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
+use super::describe::{Counts, Totals, grouped};
+use super::occlusion::{self, OcclusionPlan, OcclusionSource};
+use super::scene::{MISSING, ScenePlan};
+use super::write::{Content, PictureFiles, WritePlan};
+use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use crate::geometry::Dimension;
+use crate::render::visibility::Method as Visibility;
+use crate::render::{self, Aov, Columns, NOTHING, Renderer};
+
+/// The most voxels along an axis.
+pub const MAX_DIMENSION: u64 = 65_535;
+/// The working set of a slab: so little that memory is used again for the next, not asked for anew.
+const SLAB_BYTES: usize = 16 << 20;
+
+/// An image of a scene: a volume of voxels in 4D, a picture in 3D.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct RenderSpec {
+    /// A name for later stages to refer to.
+    pub id: Option<String>,
+    /// The scene, or the occlusion (and with it its scene), by its id.
+    pub input: Option<String>,
+    /// The occlusion that darkens the image, by its id; `none` renders without (default: the nearest earlier one, if any).
+    pub occlusion: Option<String>,
+    /// Where it is seen from.
+    pub camera: Option<CameraSpec>,
+    /// Voxels along x, y and z; in 3D pixels along x and y.
+    pub dimensions: Vec<u64>,
+    /// How the vertices' values spread over a simplex (default `smooth`).
+    pub shading: Option<Shading>,
+    /// How it is found out what voxels see; changes the time, never the image (default `auto`, the faster one).
+    pub visibility: Option<Visibility>,
+}
+
+/// How the occlusion at the vertices becomes that of a visible point.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shading {
+    /// Interpolated over the simplex.
+    #[default]
+    Smooth,
+    /// The mean over the simplex.
+    Flat,
+    /// Computed at the visible point itself: slow, the reference for the others.
+    Voxel,
+}
+
+/// An image of a scene, as understood.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RenderPlan {
+    /// The scene it shows.
+    pub scene: Ref<ScenePlan>,
+    /// The occlusion that darkens it; none renders without.
+    pub occlusion: Option<Ref<OcclusionPlan>>,
+    /// Where it is seen from.
+    pub camera: CameraPlan,
+    /// Voxels along x, y and z; one layer in 3D.
+    pub dimensions: [usize; 3],
+    /// How vertex values spread.
+    pub shading: Shading,
+    /// How it is found out what voxels see.
+    pub visibility: Visibility,
+    /// The arrays that its files need, in their own order, each once.
+    pub arrays: Vec<Aov>,
+}
+
+impl RenderPlan {
+    /// The number of voxels.
+    pub fn voxels(&self) -> u64 {
+        self.dimensions.iter().map(|&d| d as u64).product()
+    }
+}
+
+impl Stage for RenderPlan {
+    type Spec = RenderSpec;
+    const KIND: &'static str = "render";
+    const LIST: &'static str = "renders";
+    const LEFT_OUT: &'static [LeftOut] = &[
+        LeftOut::new("/scene", "the key of the scene itself takes part"),
+        LeftOut::new("/occlusion", "the key of the occlusion itself takes part"),
+        LeftOut::new("/visibility", "changes the time, never the image"),
+        LeftOut::new("/arrays", "each file has the key of what it holds"),
+    ];
+
+    fn id(spec: &RenderSpec) -> Option<&str> {
+        spec.id.as_deref()
+    }
+
+    fn resolve(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
+        let (scene, occlusion) = scene_and_occlusion(resolver, path, spec)?;
+        let dimension = resolver.plan[scene].dimension;
+        let blank = CameraSpec::default();
+        let camera_spec = spec.camera.as_ref().unwrap_or(&blank);
+        let warnings = &mut resolver.plan.warnings;
+        let camera = camera::plan(camera_spec, &format!("{path}.camera"), dimension, warnings)?;
+        let shading = spec.shading.unwrap_or_default();
+        let refusal = match occlusion.map(|o| &resolver.plan[o].source).filter(|_| shading == Shading::Voxel) {
+            Some(OcclusionSource::Load(_)) => Some(
+                "`voxel` computes occlusion at the visible points, which a loaded file has no values for".to_owned(),
+            ),
+            Some(OcclusionSource::Compute(computation)) if computation.method.is_of_the_thesis() => {
+                let method = computation.method.as_str();
+                Some(format!("`{method}` has values at vertices only; take `flat`, as the thesis did"))
+            }
+            _ => None,
+        };
+        if let Some(message) = refusal {
+            return Err(Invalid::new(format!("{path}.shading"), message));
+        }
+        if let Some(scene) = resolver.plan.get_mut(scene) {
+            scene.eye.get_or_insert_with(|| camera.eye.clone());
+        }
+        let dimensions = dimensions(&format!("{path}.dimensions"), &spec.dimensions, dimension)?;
+        let visibility = spec.visibility.unwrap_or_default();
+        Ok(Self { scene, occlusion, camera, dimensions, shading, visibility, arrays: Vec::new() })
+    }
+
+    fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
+        let written = plan.all::<WritePlan>().any(|(_, write)| write.render == me);
+        (!written).then_some("no `write` stage writes this image")
+    }
+
+    fn works_on(&self) -> Vec<usize> {
+        std::iter::once(self.scene.index()).chain(self.occlusion.map(Ref::index)).collect()
+    }
+
+    fn scene(me: Ref<Self>, plan: &Plan) -> Option<Ref<ScenePlan>> {
+        Some(plan[me].scene)
+    }
+
+    /// The memory of a slab of one layer: what is seen, its shade, and the arrays of the files that have to be made.
+    fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
+        let render = &plan[me];
+        let mut aovs: BTreeSet<Aov> = BTreeSet::new();
+        for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == me) {
+            aovs.extend(write.stale(Content::Voxels, stale).into_iter().flat_map(|file| file.format.arrays(write)));
+        }
+        if aovs.is_empty() {
+            return Needs::default();
+        }
+        let dimension = plan[render.scene].dimension;
+        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
+        let columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
+        let voxel = size_of::<u32>() as u64 + columns.bytes::<4>() as u64 + arrays;
+        Needs { memory: (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel), disk: 0 }
+    }
+
+    fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
+        let render = &plan[me];
+        let [x, y, z] = render.dimensions;
+        let with = match render.occlusion {
+            Some(occlusion) => format!("with {}", plan.id(occlusion)),
+            None => "without occlusion".into(),
+        };
+        let projection = match render.camera.projection {
+            ProjectionPlan::Perspective { field_of_view } => format!("perspective {field_of_view} degrees"),
+            ProjectionPlan::Parallel { height } => format!("parallel, height {height}"),
+        };
+        let extent = match plan[render.scene].dimension {
+            Dimension::Three => format!("{x} x {y}"),
+            Dimension::Four => format!("{x} x {y} x {z}"),
+        };
+        let (scene, voxels) = (plan.id(render.scene), grouped(render.voxels()));
+        format!("{scene} {with}: {extent} = {voxels} voxels, {}, {projection}", render.shading.as_str())
+    }
+
+    fn totals(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> Totals {
+        Totals { voxels: plan[me].voxels(), ..Totals::default() }
+    }
+
+    /// Makes the picture, if some file of it isn't there yet, and its files with it.
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+        let plan = run.plan;
+        if !is_stale(me, plan, &|file| run.is_stale(file)) {
+            return Ok("as it was".to_owned());
+        }
+        let render = &plan[me];
+        if let Some(occlusion) = render.occlusion.filter(|_| render.shading != Shading::Voxel) {
+            occlusion::values(occlusion, run, scene)?;
+        }
+        let shading = shading(plan, render, scene);
+        let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
+        picture.visibility = render.visibility;
+        let start = Instant::now();
+        let hash = scene.session.mesh_hash();
+        let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &picture.grid, hash)?;
+        let aovs = files.aovs().to_vec();
+        let mut seen = 0;
+        // Two passes over the voxels: what is seen, and its shade.
+        let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
+        picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
+            seen += slab.seen;
+            Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
+        })?;
+        running.end();
+        let rendering = start.elapsed();
+        let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
+        let notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
+        for (file, bytes) in files.finish()? {
+            run.made(&file, bytes, notes.clone())?;
+        }
+        let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
+        Ok(format!(
+            "{} of {} voxels see something, {rate:.2} million voxels a second",
+            grouped(seen),
+            grouped(render.voxels())
+        ))
+    }
+}
+
+/// Whether some file has to be made that holds voxels of a render.
+pub(super) fn is_stale(me: Ref<RenderPlan>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> bool {
+    let mut writes = plan.all::<WritePlan>().filter(|(_, write)| write.render == me);
+    writes.any(|(_, write)| !write.stale(Content::Voxels, stale).is_empty())
+}
+
+/// Bytes that a voxel takes in this array.
+pub(super) fn array_bytes(aov: Aov, dimension: Dimension) -> u64 {
+    let bytes = match dimension {
+        Dimension::Three => aov.bytes::<3>(),
+        Dimension::Four => aov.bytes::<4>(),
+    };
+    bytes as u64
+}
+
+/// Marks the vertices of the simplices that a render shows, unless that costs more than is `left` to spend on it.
+/// Returns whether it did.
+pub(super) fn mark_seen<const D: usize>(
+    me: Ref<RenderPlan>,
+    run: &Run,
+    scene: &SceneRun<D>,
+    left: &mut u64,
+    mask: &mut [bool],
+) -> Result<bool, StageError> {
+    let render = &run.plan[me];
+    let camera = camera::camera(&render.camera)?;
+    let grid = camera.grid(render.dimensions);
+    let backend = Arc::clone(scene.session.backend()?);
+    let visibility = render::Visibility::new(backend, &camera, &grid, render.visibility);
+    *left = left.saturating_sub(visibility.cost());
+    if *left == 0 {
+        return Ok(false);
+    }
+    let _running = run.progress.stage(&format!("what {} shows", run.plan.id(me)), render.voxels());
+    let thick = (SLAB_BYTES / size_of::<u32>() / grid.layer_len()).clamp(1, grid.dimensions[2]);
+    for first in (0..grid.dimensions[2]).step_by(thick) {
+        let layers = first..grid.dimensions[2].min(first + thick);
+        let mut last = NOTHING;
+        for simplex in visibility.first_hits(layers, run.progress)? {
+            if simplex != NOTHING && simplex != last {
+                scene.session.mesh().simplices[simplex as usize].iter().for_each(|&v| mask[v as usize] = true);
+                last = simplex;
+            }
+        }
+    }
+    Ok(true)
+}
+
+fn shading<const D: usize>(plan: &Plan, render: &RenderPlan, scene: &SceneRun<D>) -> render::Shading {
+    let Some(occlusion) = render.occlusion else { return render::Shading::None };
+    match (render.shading, &plan[occlusion].source) {
+        (Shading::Voxel, OcclusionSource::Compute(computation)) => render::Shading::Voxel(computation.estimator()),
+        (Shading::Flat, _) => render::Shading::Flat(Arc::clone(&scene.values[&occlusion])),
+        _ => render::Shading::Smooth(Arc::clone(&scene.values[&occlusion])),
+    }
+}
+
+/// Why a picture shows nothing.
+fn nothing_seen<const D: usize>(picture: &Renderer<D>, id: &str) -> String {
+    let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
+    let why = if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
+        "the scene lies wholly behind the camera; turn the camera, or move it back"
+    } else {
+        "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"
+    };
+    format!("render {id} shows background only: {why}")
+}
+
+impl Shading {
+    /// As the pipeline names it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Shading::Smooth => "smooth",
+            Shading::Flat => "flat",
+            Shading::Voxel => "voxel",
+        }
+    }
+}
+
+/// What a render shows, and what darkens it. Named keys decide; what they leave open is the nearest earlier one; and
+/// an occlusion of another scene is refused.
+fn scene_and_occlusion(
+    resolver: &Resolver,
+    path: &str,
+    spec: &RenderSpec,
+) -> Result<(Ref<ScenePlan>, Option<Ref<OcclusionPlan>>), Invalid> {
+    let plan = &resolver.plan;
+    let (mut of_scene, mut of_occlusion) = (None, None);
+    if let Some(name) = &spec.input {
+        let input = resolver.lookup(&format!("{path}.input"), name, &[ScenePlan::KIND, OcclusionPlan::KIND])?;
+        (of_scene, of_occlusion) = (plan.reference::<ScenePlan>(input), plan.reference::<OcclusionPlan>(input));
+    }
+    let named: Option<Ref<OcclusionPlan>> = match spec.occlusion.as_deref() {
+        None | Some("none") => None,
+        Some(name) => plan.reference(resolver.lookup(&format!("{path}.occlusion"), name, &[OcclusionPlan::KIND])?),
+    };
+    let scene = match (of_scene, of_occlusion.or(named)) {
+        (Some(scene), _) => scene,
+        (None, Some(occlusion)) => plan[occlusion].scene,
+        (None, None) => resolver.nearest(|_| true).ok_or_else(|| Invalid::new(path, MISSING))?,
+    };
+    if let Some(occlusion) = named {
+        let other = plan[occlusion].scene;
+        if other != scene {
+            let message = format!(
+                "`{}` is the occlusion of scene `{}`, and `input` shows scene `{}`",
+                plan.id(occlusion),
+                plan.id(other),
+                plan.id(scene)
+            );
+            return Err(Invalid::new(format!("{path}.occlusion"), message));
+        }
+        return Ok((scene, named));
+    }
+    if spec.occlusion.is_some() {
+        return Ok((scene, None));
+    }
+    if of_occlusion.is_some() {
+        return Ok((scene, of_occlusion));
+    }
+    if of_scene.is_some() {
+        return Ok((scene, resolver.nearest(|occlusion: Ref<OcclusionPlan>| plan[occlusion].scene == scene)));
+    }
+    match resolver.nearest(|_: Ref<OcclusionPlan>| true) {
+        Some(occlusion) if plan[occlusion].scene != scene => {
+            let message = format!(
+                "the nearest scene is `{}`, but the nearest occlusion (`{}`) is of scene `{}`; say `occlusion: none`, or which by `input`",
+                plan.id(scene),
+                plan.id(occlusion),
+                plan.id(plan[occlusion].scene)
+            );
+            Err(Invalid::new(path, message))
+        }
+        occlusion => Ok((scene, occlusion)),
+    }
+}
+
+fn dimensions(path: &str, given: &[u64], dimension: Dimension) -> Result<[usize; 3], Invalid> {
+    let three = match (dimension, given) {
+        (Dimension::Three, &[x, y]) | (Dimension::Three, &[x, y, 1]) => [x, y, 1],
+        (Dimension::Four, &[x, y, z]) => [x, y, z],
+        (Dimension::Three, _) => {
+            let message = format!("expected [WIDTH, HEIGHT] for a 3D scene, found {given:?}");
+            return Err(Invalid::new(path, message));
+        }
+        (Dimension::Four, _) => {
+            let message = format!("expected [WIDTH, HEIGHT, DEPTH] for a 4D scene, found {given:?}");
+            return Err(Invalid::new(path, message));
+        }
+    };
+    for (i, &n) in three.iter().enumerate() {
+        if !(1..=MAX_DIMENSION).contains(&n) {
+            return Err(Invalid::new(format!("{path}[{i}]"), format!("expected 1 to {MAX_DIMENSION}, found {n}")));
+        }
+    }
+    // 48 bits of voxels at most, 46 bytes each at most: fits 64 bits. Whether it fits memory and disk is for the run.
+    let three = three.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
+    match three.iter().try_fold(64_usize, |bytes, &n| bytes.checked_mul(n)) {
+        Some(_) => Ok(three),
+        None => Err(Invalid::new(path, "more voxels than this computer can address")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::{Document, Pipeline};
+    use crate::stages::paraview::FigurePlan;
+
+    const SCENES: &str = "name: p
+stages:
+  - scene: {id: a, objects: []}
+  - occlusion: {id: ao-a, file: a.f32}
+  - scene: {id: b, dimension: 3, objects: []}
+";
+
+    fn pipeline(stages: &str) -> Result<Pipeline, String> {
+        let document = Document::parse("p.yaml", &format!("{SCENES}{stages}")).unwrap();
+        Pipeline::from_document(document, &[], None).map_err(|e| e.to_string())
+    }
+
+    /// The ids of what the last render shows and is darkened by, or the refusal without its place.
+    fn resolved(stages: &str) -> String {
+        match pipeline(stages) {
+            Err(message) => message.split_once(": ").unwrap().1.to_owned(),
+            Ok(Pipeline { plan, .. }) => {
+                let (_, render) = plan.all::<RenderPlan>().next_back().unwrap();
+                let occlusion = render.occlusion.map_or("none", |o| plan.id(o));
+                format!("{} {occlusion}", plan.id(render.scene))
+            }
+        }
+    }
+
+    #[test]
+    fn scenes_and_occlusions_find_each_other() {
+        let nearest = "stages[3].render: the nearest scene is `b`, but the nearest occlusion (`ao-a`) is of scene `a`; \
+             say `occlusion: none`, or which by `input`";
+        let foreign = "stages[3].render.occlusion: `ao-a` is the occlusion of scene `a`, and `input` shows scene `b`";
+        for (render, expected) in [
+            ("{dimensions: [2, 2]}", nearest),
+            ("{dimensions: [2, 2], occlusion: none}", "b none"),
+            ("{dimensions: [2, 2], input: b}", "b none"),
+            ("{dimensions: [2, 2, 2], input: a}", "a ao-a"),
+            ("{dimensions: [2, 2, 2], input: ao-a}", "a ao-a"),
+            ("{dimensions: [2, 2, 2], occlusion: ao-a}", "a ao-a"),
+            ("{dimensions: [2, 2, 2], input: ao-a, occlusion: none}", "a none"),
+            ("{dimensions: [2, 2], input: b, occlusion: ao-a}", foreign),
+        ] {
+            assert_eq!(resolved(&format!("  - render: {render}\n")), expected, "{render}");
+        }
+        assert_eq!(resolved("  - occlusion: {}\n  - render: {dimensions: [2, 2, 1]}\n"), "b occlusion-2");
+        assert_eq!(
+            resolved("  - occlusion: {id: x, input: a}\n  - render: {dimensions: [2, 2, 2], input: a}\n"),
+            "a x"
+        );
+    }
+
+    #[test]
+    fn a_render_gathers_what_its_files_need() {
+        let plan = pipeline(
+            "  - render: {id: r, input: a, dimensions: [2, 3, 4], camera: {eye: [0, 0, 0, 2]}}
+  - render: {input: a, dimensions: [2, 3, 4], camera: {eye: [0, 0, 0, 3]}}
+  - write: {input: r, raw: r.raw, arrays: [depth]}
+  - write: {input: r, vti: r.vti, arrays: [opacity, rgba, normal]}
+  - paraview: {input: r, state: vti.py}
+  - paraview: {input: [r, r], state: raw.py, reader: raw}
+",
+        )
+        .unwrap();
+        let warnings: Vec<String> = plan.warnings().map(|w| w.to_string()).collect();
+        let plan = plan.plan;
+        let (renders, figures): (Vec<_>, Vec<_>) =
+            (plan.all::<RenderPlan>().collect(), plan.all::<FigurePlan>().map(|(_, figure)| figure).collect());
+        let scenes: Vec<_> = plan.all::<ScenePlan>().map(|(_, scene)| scene).collect();
+        let nth = |figure: &FigurePlan| -> Vec<usize> { figure.writes.iter().map(|write| write.nth()).collect() };
+        let arrays: Vec<&str> = renders[0].1.arrays.iter().map(|array| array.name()).collect();
+        assert_eq!(arrays, ["rgba", "opacity", "rgb", "normal"]);
+        assert_eq!((nth(figures[0]), nth(figures[1])), (vec![1], vec![0, 0]));
+        assert_eq!(scenes[0].eye, Some(vec![0.0, 0.0, 0.0, 2.0]), "the first render's");
+        assert_eq!(scenes[1].eye, None);
+        assert_eq!(plan.all::<WritePlan>().map(|(write, _)| plan.id(write)).collect::<Vec<_>>(), ["write", "write-2"]);
+        let files: Vec<_> = plan.files().iter().map(|file| file.to_str().unwrap()).collect();
+        assert_eq!(files, ["a.f32", "r.raw", "r.vti", "vti.py", "raw.py"]);
+        assert!(
+            warnings.iter().any(|w| w == "p.yaml:7:13: stages[4].render: no `write` stage writes this image"),
+            "{warnings:?}"
+        );
+        assert!(warnings.iter().any(|w| w.ends_with("write.arrays: has no effect without `vti`")), "{warnings:?}");
+    }
+}

@@ -1,0 +1,95 @@
+//! What a stage has at hand when it runs: the scene, what earlier stages found, and the book of files.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::occlusion::OcclusionPlan;
+use super::prepare::Loaded;
+use super::{Plan, Ref, StageError};
+use crate::io;
+use crate::occlusion::Estimates;
+use crate::progress::Progress;
+use crate::session::Session;
+
+/// Who knows which files have to be made, and remembers those that were.
+pub trait Ledger {
+    /// Whether this file, below the output folder, has to be made.
+    fn is_stale(&self, file: &Path) -> bool;
+
+    /// Remembers a file that was just written, on disk, so that the next run trusts it.
+    ///
+    /// # Errors
+    /// If that can't be written down.
+    fn record(&mut self, made: Made) -> Result<(), io::Error>;
+
+    /// Forgets a file that was taken away.
+    ///
+    /// # Errors
+    /// If that can't be written down.
+    fn forget(&mut self, file: &Path) -> Result<(), io::Error>;
+}
+
+/// A file that was just written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Made<'a> {
+    /// Its path below the output folder.
+    pub file: &'a Path,
+    /// Its length.
+    pub bytes: u64,
+    /// What the user should know of it, now and whenever it is found unchanged.
+    pub notes: Vec<String>,
+    /// Whether the user is told of it, as of something the pipeline names.
+    pub named: bool,
+    /// Whether it was there already. No key is needed then.
+    pub unchanged: bool,
+}
+
+/// A run in progress.
+pub struct Run<'p> {
+    /// What is to be done.
+    pub plan: &'p Plan,
+    /// Who watches.
+    pub progress: &'p dyn Progress,
+    /// The book of files.
+    pub ledger: &'p mut dyn Ledger,
+    /// The values that were read from files.
+    pub loaded: BTreeMap<Ref<OcclusionPlan>, Loaded>,
+    /// Whether all is made again.
+    pub force: bool,
+    /// Of stages whose work was done for the sake of a later one: how long it took, and what is worth telling.
+    pub early: BTreeMap<usize, (Duration, String)>,
+}
+
+impl Run<'_> {
+    /// The files of a stage that have to be made.
+    pub fn is_stale(&self, file: &Path) -> bool {
+        self.ledger.is_stale(file)
+    }
+
+    /// Remembers a file that the pipeline names.
+    ///
+    /// # Errors
+    /// If that can't be written down.
+    pub fn made(&mut self, file: &Path, bytes: u64, notes: Vec<String>) -> Result<(), StageError> {
+        Ok(self.ledger.record(Made { file, bytes, notes, named: true, unchanged: false })?)
+    }
+
+    /// Remembers a file that goes with another.
+    ///
+    /// # Errors
+    /// If that can't be written down.
+    pub fn made_beside(&mut self, file: &Path, bytes: u64) -> Result<(), StageError> {
+        Ok(self.ledger.record(Made { file, bytes, notes: Vec::new(), named: false, unchanged: false })?)
+    }
+}
+
+/// What has been made of a scene so far.
+#[derive(Debug)]
+pub struct SceneRun<const D: usize> {
+    /// The scene, and what traces rays in it.
+    pub session: Session<D>,
+    /// The values that are known.
+    pub values: BTreeMap<Ref<OcclusionPlan>, Arc<Estimates>>,
+}

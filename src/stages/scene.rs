@@ -1,0 +1,200 @@
+//! `scene`: objects in space.
+//!
+//! The one place where a dimension known at run time becomes one known to the compiler: [`AnyMesh`].
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use super::camera::camera;
+use super::describe::{Counts, grouped};
+use super::render::RenderPlan;
+use super::{Invalid, LeftOut, Plan, Ref, Resolver, Stage};
+use crate::geometry::Dimension;
+use crate::mesh::{Mesh, MeshBuilder, Orientation};
+use crate::progress::Progress;
+use crate::scene::{self, ObjectSpec, build_object_watched};
+
+/// The most objects in a scene: the `object` array numbers them with 16 bits, and 0 is the background.
+pub const MAX_OBJECTS: usize = 65_535;
+/// Said where a stage lacks a scene.
+pub(super) const MISSING: &str = "there is no earlier `scene` to work on; put one first";
+
+/// Objects in space.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// A name for later stages to refer to.
+    pub id: Option<String>,
+    /// 4 (default), or 3 for triangles in ordinary space.
+    #[schemars(range(min = 3, max = 4))]
+    pub dimension: Option<u64>,
+    /// The objects. Those that come first win where two are hit at the same distance.
+    pub objects: Vec<ObjectSpec>,
+}
+
+/// Objects in space, as understood.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScenePlan {
+    /// The space it is in.
+    pub dimension: Dimension,
+    /// What is in it.
+    pub objects: Vec<ObjectSpec>,
+    /// The eye of the first render of this scene, for open objects that are to face it.
+    pub eye: Option<Vec<f64>>,
+}
+
+impl Stage for ScenePlan {
+    type Spec = SceneSpec;
+    const KIND: &'static str = "scene";
+    const LIST: &'static str = "scenes";
+    const LEFT_OUT: &'static [LeftOut] =
+        &[LeftOut::new("/eye", "where an object faces the eye, the whole camera takes part; nothing else looks at it")];
+
+    fn id(spec: &SceneSpec) -> Option<&str> {
+        spec.id.as_deref()
+    }
+
+    fn resolve(spec: &SceneSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
+        let number = spec.dimension.unwrap_or(4);
+        let Some(dimension) = Dimension::new(number) else {
+            return Err(Invalid::new(format!("{path}.dimension"), format!("expected 3 or 4, found {number}")));
+        };
+        let objects = format!("{path}.objects");
+        if spec.objects.is_empty() {
+            resolver.warn(&objects, "the scene is empty; its images show background only");
+        }
+        if spec.objects.len() > MAX_OBJECTS {
+            let message = format!("expected at most {MAX_OBJECTS} objects, found {}", spec.objects.len());
+            return Err(Invalid::new(objects, message));
+        }
+        let mut names = BTreeMap::new();
+        for (i, object) in spec.objects.iter().enumerate() {
+            let Some(name) = &object.name else { continue };
+            if let Some(first) = names.insert(name, i) {
+                let message = format!("objects[{first}] is called `{name}` already");
+                return Err(Invalid::new(format!("{objects}[{i}].name"), message));
+            }
+        }
+        Ok(Self { dimension, objects: spec.objects.clone(), eye: None })
+    }
+
+    fn works_on(&self) -> Vec<usize> {
+        Vec::new()
+    }
+
+    fn scene(me: Ref<Self>, _plan: &Plan) -> Option<Ref<Self>> {
+        Some(me)
+    }
+
+    fn input_files(&self, plan: &Plan) -> Vec<PathBuf> {
+        let shapes = self.objects.iter().filter_map(|object| object.shape().ok());
+        shapes.flat_map(|shape| shape.input_files(&plan.folder)).collect()
+    }
+
+    fn depends_on(me: Ref<Self>, plan: &Plan) -> Value {
+        let faces_eye = plan[me].objects.iter().any(|object| object.orientation == scene::Orientation::Eye);
+        // The first camera matters to what is turned to face it, and to nothing else.
+        json!(first_render(plan, me).filter(|_| faces_eye).map(|render| &render.camera))
+    }
+
+    fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String {
+        let Self { dimension, objects, .. } = &plan[me];
+        let counts = (counts.get(me.nth()))
+            .map(|c| format!(", {} vertices, {} simplices", grouped(c.vertices), grouped(c.simplices)));
+        let noun = if objects.len() == 1 { "object" } else { "objects" };
+        format!("{}D, {} {noun}{}", dimension.get(), objects.len(), counts.unwrap_or_default())
+    }
+
+    fn show(fields: &mut Map<String, Value>) {
+        let count = fields["objects"].as_array().map_or(0, Vec::len);
+        fields["objects"] = count.into();
+    }
+}
+
+/// The first render of a scene.
+fn first_render(plan: &Plan, scene: Ref<ScenePlan>) -> Option<&RenderPlan> {
+    plan.all::<RenderPlan>().map(|(_, render)| render).find(|render| render.scene == scene)
+}
+
+/// A mesh of either dimension.
+#[derive(Clone, Debug)]
+pub enum AnyMesh {
+    /// Triangles in R^3.
+    Three(Mesh<3>),
+    /// Tetrahedra in R^4.
+    Four(Mesh<4>),
+}
+
+impl AnyMesh {
+    /// Builds a scene of the plan. What is worth telling of its objects goes into `notes`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with an object, at the key to blame; anything if `progress` says to stop.
+    pub fn build(
+        plan: &Plan,
+        scene: Ref<ScenePlan>,
+        notes: &mut Vec<String>,
+        progress: &dyn Progress,
+    ) -> Result<Self, Invalid> {
+        match plan[scene].dimension {
+            Dimension::Three => build(plan, scene, notes, progress).map(Self::Three),
+            Dimension::Four => build(plan, scene, notes, progress).map(Self::Four),
+        }
+    }
+
+    /// How much is in it.
+    pub fn counts(&self) -> Counts {
+        let (vertices, simplices) = match self {
+            Self::Three(m) => (m.vertices.len(), m.simplices.len()),
+            Self::Four(m) => (m.vertices.len(), m.simplices.len()),
+        };
+        Counts { vertices: vertices as u64, simplices: simplices as u64 }
+    }
+}
+
+/// Builds a scene: each object's surface, one after the other, into one mesh.
+pub fn build<const D: usize>(
+    plan: &Plan,
+    scene: Ref<ScenePlan>,
+    notes: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Mesh<D>, Invalid> {
+    let (path, id) = (plan.path(scene), plan.id(scene));
+    let mut builder = MeshBuilder::<D>::new();
+    for (i, object) in plan[scene].objects.iter().enumerate() {
+        let here = format!("{path}.objects[{i}]");
+        let refuse = |key: &str, message: String| {
+            Invalid::new(if key.is_empty() { here.clone() } else { format!("{here}.{key}") }, message)
+        };
+        // The path names the key already.
+        let blame = |error: scene::Error| {
+            let (key, message) = (error.key(), error.to_string());
+            refuse(key, message.strip_prefix(&format!("{key}: ")).unwrap_or(&message).to_owned())
+        };
+        let name = object.name.clone().unwrap_or_else(|| format!("object {}", i + 1));
+        let mut told = Vec::new();
+        let surface = build_object_watched::<D>(object, &plan.folder, &mut told, progress).map_err(blame)?;
+        notes.extend(told.into_iter().map(|note| format!("scene {id}, {name}: {note}")));
+        let open = match object.orientation {
+            scene::Orientation::Input => Orientation::Input,
+            scene::Orientation::Eye => match first_render(plan, scene) {
+                Some(render) => {
+                    let camera = camera::<D>(&render.camera).map_err(|e| refuse("orientation", e.to_string()))?;
+                    Orientation::Facing(camera.viewpoint())
+                }
+                None => {
+                    let message = "`eye` faces the camera of the first render of this scene, and there is none";
+                    return Err(refuse("orientation", message.to_owned()));
+                }
+            },
+        };
+        let color = object.color.rgb().map_err(blame)?;
+        let crease = object.crease().map_err(blame)?;
+        builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
+    }
+    builder.finish_watched(progress).ok_or_else(|| Invalid::new(path, "stopped"))
+}

@@ -1,0 +1,71 @@
+//! The open files of one picture: each slab goes to all of them.
+
+use std::path::{Path, PathBuf};
+
+use super::{Content, Opening, VoxelFile, WritePlan};
+use crate::io::Error;
+use crate::render::Aov;
+use crate::stages::render::RenderPlan;
+use crate::stages::{Plan, Ref};
+use crate::volume::{Array, Grid};
+
+/// The open files of one picture.
+pub(in crate::stages) struct PictureFiles {
+    aovs: Vec<Aov>,
+    files: Vec<Open>,
+}
+
+struct Open {
+    path: PathBuf,
+    file: Box<dyn VoxelFile>,
+    /// Where among the aovs its arrays are.
+    places: Vec<usize>,
+}
+
+impl PictureFiles {
+    /// Opens those files of a render that have to be made.
+    pub fn create(
+        render: Ref<RenderPlan>,
+        plan: &Plan,
+        stale: &dyn Fn(&Path) -> bool,
+        grid: &Grid,
+        mesh_hash: &str,
+    ) -> Result<Self, Error> {
+        let mut aovs: Vec<Aov> = Vec::new();
+        let mut place = |aov: Aov| {
+            aovs.iter().position(|&c| c == aov).unwrap_or_else(|| {
+                aovs.push(aov);
+                aovs.len() - 1
+            })
+        };
+        let mut files = Vec::new();
+        for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == render) {
+            for file in write.stale(Content::Voxels, stale) {
+                let path = plan.out.join(&file.path);
+                let opened = file.format.open(Opening { path: &path, plan, write, grid, mesh_hash })?;
+                let places = file.format.arrays(write).into_iter().map(&mut place).collect();
+                files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
+            }
+        }
+        Ok(Self { aovs, files })
+    }
+
+    /// What the files need of each slab, in this order.
+    pub fn aovs(&self) -> &[Aov] {
+        &self.aovs
+    }
+
+    /// Writes some layers, of which `first` is the first, to all files.
+    pub fn add_slab(&mut self, first: usize, slab: &[Array]) -> Result<(), Error> {
+        for Open { file, places, .. } in &mut self.files {
+            let arrays: Vec<&Array> = places.iter().map(|&place| &slab[place]).collect();
+            file.add_slab(first, &arrays)?;
+        }
+        Ok(())
+    }
+
+    /// Completes the files and gives them their names; returns each with its length.
+    pub fn finish(self) -> Result<Vec<(PathBuf, u64)>, Error> {
+        self.files.into_iter().map(|Open { path, file, .. }| Ok((path, file.finish()?))).collect()
+    }
+}

@@ -1,0 +1,450 @@
+//! `write`: the files of an image, one file here a format.
+//!
+//! A format holds all there is to know of an output: its key in YAML and its extension, what it is made of (voxels, in which
+//! arrays, or the mesh), what its key leaves out, its bytes on the disk, and how it is written. The rows of `formats!` are
+//! the index: a new format is one file and one row.
+
+mod files;
+mod png;
+mod raw;
+mod vti;
+mod vtu;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Serialize, Serializer};
+use serde_json::{Map, Value};
+
+use super::camera::camera;
+use super::describe::{Counts, Totals, size};
+use super::occlusion;
+use super::render::RenderPlan;
+use super::scene::ScenePlan;
+use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use crate::geometry::Dimension;
+use crate::io::{AtomicFile, Error};
+use crate::mesh::Mesh;
+use crate::occlusion::Estimates;
+use crate::render::{Aov, Camera};
+use crate::volume::{Array, Grid};
+
+pub(super) use files::PictureFiles;
+
+/// Name and version, as files record it.
+pub(crate) const PROGRAM: &str = concat!("ao4d ", env!("CARGO_PKG_VERSION"));
+
+/// What a format's files are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// The picture's arrays, slab by slab.
+    Voxels,
+    /// The scene's mesh, as the camera sees it.
+    Mesh,
+}
+
+/// What a format says of itself.
+trait OutputFormat {
+    /// What its files are made of.
+    const CONTENT: Content;
+    /// The fields of the write that its key leaves out.
+    const LEFT_OUT: &'static [LeftOut];
+    /// Whether its files tell of the pipeline's name and seed.
+    const TELLS_PIPELINE: bool = false;
+
+    /// The arrays that it needs of a picture.
+    fn arrays(_write: &WritePlan) -> Vec<Aov> {
+        Vec::new()
+    }
+
+    /// Bytes of its numbers a voxel of the image, before compression, for scenes of this dimension.
+    fn voxel_bytes(_write: &WritePlan, _dimension: Dimension) -> u64 {
+        0
+    }
+
+    /// Bytes a voxel that the disk must have left, as far as they are known before.
+    fn disk_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
+        Self::voxel_bytes(write, dimension)
+    }
+
+    /// Opens a file for a picture's arrays.
+    fn open(_file: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+        Ok(None)
+    }
+
+    /// Writes a file of a mesh; returns its length, and how many simplices had to be left out.
+    fn write_mesh<const D: usize>(
+        _path: &Path,
+        _mesh: &Mesh<D>,
+        _camera: &Camera<D>,
+        _found: Option<&Estimates>,
+    ) -> Result<(u64, usize), Error> {
+        Ok((0, 0))
+    }
+}
+
+/// What a file is opened with.
+struct Opening<'a> {
+    path: &'a Path,
+    plan: &'a Plan,
+    write: &'a WritePlan,
+    grid: &'a Grid,
+    mesh_hash: &'a str,
+}
+
+/// An open file that takes a picture slab by slab.
+trait VoxelFile {
+    /// Takes layers, `first` being the number of the first; `slab` has the arrays that the format needs, in its order.
+    fn add_slab(&mut self, first: usize, slab: &[&Array]) -> Result<(), Error>;
+
+    /// Completes the file and gives it its name; returns its length.
+    fn finish(self: Box<Self>) -> Result<u64, Error>;
+}
+
+/// Builds the index from its rows.
+macro_rules! formats {
+    ($($(#[$doc:meta])+ $key:ident: $name:ident;)+) => {
+        /// Files of an image. At least one of `vti`, `raw`, `vtu` and `png`.
+        #[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
+        #[serde(deny_unknown_fields)]
+        pub struct WriteSpec {
+            /// A name for later stages to refer to.
+            pub id: Option<String>,
+            /// The render, by its id.
+            pub input: Option<String>,
+            $($(#[$doc])+ pub $key: Option<String>,)+
+            /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`).
+            pub arrays: Option<Vec<Aov>>,
+            /// How the `.vti` stores numbers (default `appended`).
+            pub encoding: Option<Encoding>,
+            /// How the `.vti` packs them (default `none`).
+            pub compression: Option<Compression>,
+        }
+
+        /// A format of files.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum Format {
+            $($(#[$doc])+ $name,)+
+        }
+
+        impl Format {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$name),+];
+
+            /// Its key in YAML, which is also its extension.
+            pub fn key(self) -> &'static str {
+                match self { $(Self::$name => stringify!($key)),+ }
+            }
+
+            /// What its files are made of.
+            pub fn content(self) -> Content {
+                match self { $(Self::$name => <$key::$name>::CONTENT),+ }
+            }
+
+            /// The arrays that it needs of a picture.
+            pub fn arrays(self, write: &WritePlan) -> Vec<Aov> {
+                match self { $(Self::$name => <$key::$name>::arrays(write)),+ }
+            }
+
+            /// The fields of the write that its key leaves out.
+            pub fn left_out(self) -> &'static [LeftOut] {
+                match self { $(Self::$name => <$key::$name>::LEFT_OUT),+ }
+            }
+
+            fn tells_pipeline(self) -> bool {
+                match self { $(Self::$name => <$key::$name>::TELLS_PIPELINE),+ }
+            }
+
+            fn voxel_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
+                match self { $(Self::$name => <$key::$name>::voxel_bytes(write, dimension)),+ }
+            }
+
+            fn disk_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
+                match self { $(Self::$name => <$key::$name>::disk_bytes(write, dimension)),+ }
+            }
+
+            fn open(self, file: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+                match self { $(Self::$name => <$key::$name>::open(file)),+ }
+            }
+
+            fn write_mesh<const D: usize>(
+                self,
+                path: &Path,
+                mesh: &Mesh<D>,
+                camera: &Camera<D>,
+                found: Option<&Estimates>,
+            ) -> Result<(u64, usize), Error> {
+                match self { $(Self::$name => <$key::$name>::write_mesh(path, mesh, camera, found)),+ }
+            }
+
+            /// The file that is written under its key.
+            fn named(self, spec: &WriteSpec) -> Option<&str> {
+                match self { $(Self::$name => spec.$key.as_deref()),+ }
+            }
+        }
+    };
+}
+
+formats! {
+    /// VTK image data, for ParaView: `NAME.vti`.
+    vti: Vti;
+    /// Bare float32 RGB triples, x fastest, no header: `NAME.raw`.
+    raw: Raw;
+    /// The scene's mesh as the camera sees it: `NAME.vtu`.
+    vtu: Vtu;
+    /// A quick look at slices through the image: `NAME.png`.
+    png: Png;
+}
+
+/// How a `.vti` stores numbers.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// As they are, after the XML.
+    #[default]
+    Appended,
+    /// As base64 text inside the XML.
+    Inline,
+}
+
+/// How a `.vti` packs numbers.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Compression {
+    /// Not at all.
+    #[default]
+    None,
+    /// Smaller.
+    Zlib,
+    /// Faster.
+    Lz4,
+}
+
+/// Files of an image, as understood.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WritePlan {
+    /// The image.
+    pub render: Ref<RenderPlan>,
+    /// The files, each format at most once.
+    pub files: Files,
+    /// What the image data holds, in this order.
+    pub arrays: Vec<Aov>,
+    /// Whether the pipeline says which; else figures may add what they need.
+    #[serde(skip)]
+    pub arrays_given: bool,
+    /// How it stores numbers.
+    pub encoding: Encoding,
+    /// How it packs them.
+    pub compression: Compression,
+}
+
+/// The files of a write. As JSON a mapping of all formats, with nothing for those that aren't written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Files(Vec<WriteFile>);
+
+/// A file of a write.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WriteFile {
+    /// Its format.
+    pub format: Format,
+    /// Its path below `out`.
+    pub path: PathBuf,
+}
+
+impl Serialize for Files {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(Format::ALL.len()))?;
+        for &format in Format::ALL {
+            map.serialize_entry(format.key(), &self.get(format).map(|path| path.to_string_lossy()))?;
+        }
+        map.end()
+    }
+}
+
+impl Files {
+    /// The file of this format.
+    pub fn get(&self, format: Format) -> Option<&Path> {
+        self.0.iter().find(|file| file.format == format).map(|file| file.path.as_path())
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &WriteFile> {
+        self.0.iter()
+    }
+}
+
+impl WritePlan {
+    /// The files with this content that have to be made.
+    pub(super) fn stale(&self, content: Content, stale: &dyn Fn(&Path) -> bool) -> Vec<&WriteFile> {
+        self.files.iter().filter(|file| file.format.content() == content && stale(&file.path)).collect()
+    }
+}
+
+/// What the key of a mesh leaves out of its render: it is the same whatever the image is like.
+const MESH_LEFT_OUT: &[LeftOut] = &[
+    LeftOut::new("/dimensions", "a mesh has no voxels"),
+    LeftOut::new("/shading", "a mesh has the values of its vertices"),
+];
+
+impl Stage for WritePlan {
+    type Spec = WriteSpec;
+    const KIND: &'static str = "write";
+    const LIST: &'static str = "writes";
+    const LEFT_OUT: &'static [LeftOut] = &[
+        LeftOut::new("/render", "the key of the render itself takes part"),
+        LeftOut::new("/files", "a file doesn't depend on its name, nor on what else is written"),
+    ];
+
+    fn id(spec: &WriteSpec) -> Option<&str> {
+        spec.id.as_deref()
+    }
+
+    fn resolve(spec: &WriteSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
+        let missing = "there is no earlier `render` to write; put one first";
+        let render: Ref<RenderPlan> = resolver.input(path, spec.input.as_deref(), missing)?;
+        let mut files = Files::default();
+        for &format in Format::ALL {
+            if let Some(name) = format.named(spec) {
+                let key = format!("{path}.{}", format.key());
+                let path = resolver.outputs.claim(&key, name, Some(format.key()))?;
+                files.0.push(WriteFile { format, path });
+            }
+        }
+        if files.0.is_empty() {
+            let keys: Vec<&str> = Format::ALL.iter().map(|format| format.key()).collect();
+            return Err(Invalid::new(path, format!("names no file; give at least one of {}", keys.join(", "))));
+        }
+        let arrays = match &spec.arrays {
+            None => vec![Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity],
+            Some(arrays) => arrays.clone(),
+        };
+        if arrays.is_empty() {
+            return Err(Invalid::new(format!("{path}.arrays"), "the list is empty; name at least one array"));
+        }
+        for (i, array) in arrays.iter().enumerate() {
+            if arrays[..i].contains(array) {
+                return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.name())));
+            }
+        }
+        if files.get(Format::Vti).is_none() {
+            let given = [
+                ("arrays", spec.arrays.is_some()),
+                ("encoding", spec.encoding.is_some()),
+                ("compression", spec.compression.is_some()),
+            ];
+            for (key, _) in given.into_iter().filter(|(_, given)| *given) {
+                resolver.warn(format!("{path}.{key}"), "has no effect without `vti`");
+            }
+        }
+        let (encoding, compression) = (spec.encoding.unwrap_or_default(), spec.compression.unwrap_or_default());
+        let arrays_given = spec.arrays.is_some();
+        let write = Self { render, files, arrays, arrays_given, encoding, compression };
+        if let Some(render) = resolver.plan.get_mut(render) {
+            render.arrays.extend(write.files.iter().flat_map(|file| file.format.arrays(&write)));
+            render.arrays.sort_unstable();
+            render.arrays.dedup();
+        }
+        Ok(write)
+    }
+
+    fn works_on(&self) -> Vec<usize> {
+        vec![self.render.index()]
+    }
+
+    fn scene(me: Ref<Self>, plan: &Plan) -> Option<Ref<ScenePlan>> {
+        Some(plan[plan[me].render].scene)
+    }
+
+    fn files(&self) -> Vec<&Path> {
+        self.files.iter().map(|file| file.path.as_path()).collect()
+    }
+
+    fn outputs(me: Ref<Self>, plan: &Plan, keys: &Keys) -> Vec<Output> {
+        let output = |WriteFile { format, path }: &WriteFile| {
+            let own: Vec<LeftOut> = Self::LEFT_OUT.iter().chain(format.left_out()).copied().collect();
+            let part = match format.content() {
+                Content::Voxels => keys.part(plan, me.index(), &own),
+                Content::Mesh => {
+                    let render = plan[me].render;
+                    let left_out: Vec<LeftOut> = RenderPlan::LEFT_OUT.iter().chain(MESH_LEFT_OUT).copied().collect();
+                    let fields = super::key::without(plan.fields(me.index()), &own);
+                    keys.hash(&(keys.part(plan, render.index(), &left_out), fields))
+                }
+            };
+            let pipeline = format.tells_pipeline().then(|| keys.provenance());
+            Output { file: path.clone(), beside: Vec::new(), key: keys.hash(&(part, format.key(), pipeline)) }
+        };
+        plan[me].files.iter().map(output).collect()
+    }
+
+    fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
+        let write = &plan[me];
+        let dimension = plan[plan[write.render].scene].dimension;
+        let voxel = write.files.iter().filter(|file| stale(&file.path)).map(|f| f.format.disk_bytes(write, dimension));
+        Needs { memory: 0, disk: plan[write.render].voxels().saturating_mul(voxel.sum()) }
+    }
+
+    fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String {
+        let write = &plan[me];
+        let files: Vec<String> = write.files.iter().map(|file| file.path.display().to_string()).collect();
+        let packed = write.files.get(Format::Vti).is_some() && write.compression != Compression::None;
+        let packed = if packed { " before compression" } else { "" };
+        let size = match Self::totals(me, plan, counts).bytes {
+            0 => String::new(),
+            bytes => format!(" ({}{packed})", size(bytes)),
+        };
+        format!("{} -> {}{size}", plan.id(write.render), files.join(", "))
+    }
+
+    fn totals(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> Totals {
+        let write = &plan[me];
+        let dimension = plan[plan[write.render].scene].dimension;
+        let voxel: u64 = write.files.iter().map(|file| file.format.voxel_bytes(write, dimension)).sum();
+        Totals { bytes: plan[write.render].voxels().saturating_mul(voxel), ..Totals::default() }
+    }
+
+    /// Each format's file under its own key.
+    fn show(fields: &mut Map<String, Value>) {
+        let shown = std::mem::take(fields);
+        for (key, value) in shown {
+            match value {
+                Value::Object(files) if key == "files" => fields.extend(files),
+                value => drop(fields.insert(key, value)),
+            }
+        }
+    }
+
+    /// Writes meshes. Pictures were written with the render.
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+        let plan = run.plan;
+        let write = &plan[me];
+        for WriteFile { format, path } in write.stale(Content::Mesh, &|file| run.is_stale(file)) {
+            let render = &plan[write.render];
+            if let Some(occlusion) = render.occlusion {
+                occlusion::values(occlusion, run, scene)?;
+            }
+            let (mesh, camera) = (scene.session.mesh(), camera(&render.camera)?);
+            let values = render.occlusion.map(|occlusion| &*scene.values[&occlusion]);
+            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), mesh, &camera, values)?;
+            let note = format!(
+                "{}: {left_out} of {} simplices are not wholly before the eye and are left out",
+                path.display(),
+                mesh.simplices.len()
+            );
+            run.made(path, bytes, (left_out > 0).then_some(note).into_iter().collect())?;
+        }
+        Ok(String::new())
+    }
+}
+
+/// Writes a file in one piece; returns its length.
+///
+/// # Errors
+/// If that fails; there is no file then, or the one that was there before.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<u64, Error> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(bytes).map_err(Error::from).map_err(AtomicFile::name_in(path))?;
+    file.commit()
+}

@@ -1,0 +1,53 @@
+//! `.raw`: colours alone, without a header, as the thesis had them.
+
+use std::path::PathBuf;
+
+use super::{Content, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
+use crate::geometry::Dimension;
+use crate::io::raw::RawWriter;
+use crate::io::{AtomicFile, Error};
+use crate::render::Aov;
+use crate::stages::render::array_bytes;
+use crate::volume::{Array, Values};
+
+pub(super) struct Raw;
+
+impl OutputFormat for Raw {
+    const CONTENT: Content = Content::Voxels;
+    const LEFT_OUT: &'static [LeftOut] = &[
+        LeftOut::new("/arrays", "about `.vti` only; a `.raw` has colours"),
+        LeftOut::new("/encoding", "about `.vti` only"),
+        LeftOut::new("/compression", "about `.vti` only"),
+    ];
+
+    fn arrays(_: &WritePlan) -> Vec<Aov> {
+        vec![Aov::Rgb]
+    }
+
+    fn voxel_bytes(_: &WritePlan, dimension: Dimension) -> u64 {
+        array_bytes(Aov::Rgb, dimension)
+    }
+
+    fn open(Opening { path, grid, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+        let writer = RawWriter::new(AtomicFile::create(path)?, grid);
+        Ok(Some(Box::new(File { path: path.to_owned(), writer })))
+    }
+}
+
+struct File {
+    path: PathBuf,
+    writer: RawWriter<AtomicFile>,
+}
+
+impl VoxelFile for File {
+    fn add_slab(&mut self, first: usize, slab: &[&Array]) -> Result<(), Error> {
+        if let [Array { values: Values::F32(rgb), .. }] = slab {
+            self.writer.write_slab(first, rgb).map_err(AtomicFile::name_in(&self.path))?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<u64, Error> {
+        self.writer.finish().map_err(AtomicFile::name_in(&self.path))?.commit()
+    }
+}

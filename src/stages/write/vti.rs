@@ -1,0 +1,114 @@
+//! `.vti`: VTK image data, with the arrays that are asked for, and what they were made from.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::{Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, VoxelFile, WritePlan};
+use crate::geometry::Dimension;
+use crate::io::vti::{self, ArraySpec, VtiWriter};
+use crate::io::{AtomicFile, Error};
+use crate::render::Aov;
+use crate::stages::Plan;
+use crate::stages::occlusion::OcclusionSource;
+use crate::stages::render::array_bytes;
+use crate::volume::Array;
+
+pub(super) struct Vti;
+
+impl OutputFormat for Vti {
+    const CONTENT: Content = Content::Voxels;
+    const LEFT_OUT: &'static [LeftOut] = &[];
+    const TELLS_PIPELINE: bool = true;
+
+    fn arrays(write: &WritePlan) -> Vec<Aov> {
+        write.arrays.clone()
+    }
+
+    fn voxel_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
+        write.arrays.iter().map(|&channel| array_bytes(channel, dimension)).sum()
+    }
+
+    /// How far compression gets is not known before, so compressed files count as nothing, and are refused by the
+    /// disk itself if it comes to that.
+    fn disk_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
+        let arrays = Self::voxel_bytes(write, dimension);
+        match (write.compression, write.encoding) {
+            (Compression::None, Encoding::Appended) => arrays,
+            // Four bytes of text for three, and the arrays themselves, which are kept aside until all are whole.
+            (Compression::None, Encoding::Inline) => arrays + (4 * arrays).div_ceil(3),
+            _ => 0,
+        }
+    }
+
+    fn open(Opening { path, plan, write, grid, mesh_hash }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+        let dimension = plan[plan[write.render].scene].dimension;
+        let specs: Vec<ArraySpec> = write.arrays.iter().map(|&channel| array_spec(channel, dimension)).collect();
+        let settings = settings(plan, write, mesh_hash, path.parent());
+        let out = AtomicFile::create(path)?;
+        let writer = VtiWriter::new(out, grid, &specs, &settings).map_err(AtomicFile::name_in(path))?;
+        Ok(Some(Box::new(File { path: path.to_owned(), writer })))
+    }
+}
+
+struct File {
+    path: std::path::PathBuf,
+    writer: VtiWriter<AtomicFile>,
+}
+
+impl VoxelFile for File {
+    fn add_slab(&mut self, first: usize, slab: &[&Array]) -> Result<(), Error> {
+        let writer = &mut self.writer;
+        let mut arrays = slab.iter().enumerate();
+        let written = arrays.try_for_each(|(array, values)| writer.write_slab(array, first, &values.values));
+        written.map_err(AtomicFile::name_in(&self.path))
+    }
+
+    fn finish(self: Box<Self>) -> Result<u64, Error> {
+        self.writer.finish().map_err(AtomicFile::name_in(&self.path))?.commit()
+    }
+}
+
+fn array_spec(aov: Aov, dimension: Dimension) -> ArraySpec {
+    let components = match dimension {
+        Dimension::Three => aov.components::<3>(),
+        Dimension::Four => aov.components::<4>(),
+    };
+    ArraySpec::new(aov.name(), aov.kind(), components)
+}
+
+/// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
+fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Path>) -> vti::Settings {
+    let render = &plan[write.render];
+    let scene = &plan[render.scene];
+    let occlusion = render.occlusion.map(|o| match &plan[o].source {
+        OcclusionSource::Compute(computation) => computation.told(),
+        OcclusionSource::Load(_) => json!("loaded"),
+    });
+    let settings = json!({
+        "seed": plan.seed,
+        "scene": { "dimension": scene.dimension, "mesh": mesh_hash },
+        "occlusion": occlusion,
+        "camera": render.camera,
+        "dimensions": render.dimensions,
+        "shading": render.shading,
+    });
+    vti::Settings {
+        encoding: match write.encoding {
+            Encoding::Appended => vti::Encoding::Appended,
+            Encoding::Inline => vti::Encoding::Inline,
+        },
+        compression: match write.compression {
+            Compression::None => vti::Compression::None,
+            Compression::Zlib => vti::Compression::Zlib,
+            Compression::Lz4 => vti::Compression::Lz4,
+        },
+        field_data: vec![
+            ("program".to_owned(), PROGRAM.to_owned()),
+            ("pipeline".to_owned(), plan.name.clone()),
+            ("settings".to_owned(), settings.to_string()),
+        ],
+        scratch: scratch.map(Path::to_owned),
+        ..vti::Settings::default()
+    }
+}

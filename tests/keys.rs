@@ -1,0 +1,216 @@
+//! Keys can't be forgotten: every key that a pipeline can have changes the key of some file, or stands on a list that says
+//! why not.
+//!
+//! The list of all keys is the JSON Schema's, so that a new one fails here until a change to it is written down below.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use ao4d::pipeline::{Document, Pipeline, schema};
+use ao4d::stages::Keys;
+use serde_json::Value;
+
+/// Every key of every stage is there but for `load`, and `max_samples` and `target_error` beside `samples`.
+const PIPELINE: &str = "name: p
+seed: 1
+stages:
+  - scene: {id: s, dimension: 4, objects: [
+      {name: one, tesseract: {size: 0.5}, color: [1, 0, 0], orientation: eye, transform: [{translate: [0, 0, 0, -1]}]}]}
+  - scene: {id: other, objects: []}
+  - occlusion: {id: o, input: s, method: sobol, samples: 4, max_distance: 3, file: o.f32, seed: 2}
+  - occlusion: {id: o2, input: s, samples: 8}
+  - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
+  - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
+  - render: {id: parallel, input: s, dimensions: [3, 4, 5], camera: {projection: parallel, height: 2}}
+  - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
+  - write: {id: w2, input: parallel, vti: b.vti}
+  - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
+";
+
+/// A change to each key of the stages: the key as the schema has it, and what is set to change it. Those without a change
+/// say why they need none.
+const CHANGES: &[(&str, Result<&str, &str>)] = &[
+    ("PipelineSpec.name", Ok("name=q")),
+    ("PipelineSpec.seed", Ok("seed=3")),
+    ("PipelineSpec.stages", Err("the stages follow")),
+    ("SceneSpec.id", Err("a name for other stages")),
+    ("SceneSpec.dimension", Err("changes what everything else may be; see `a_scene_s_dimension_counts`")),
+    ("SceneSpec.objects", Ok("s.objects[0].tesseract.size=0.6")),
+    ("OcclusionSpec.id", Err("a name for other stages")),
+    ("OcclusionSpec.input", Err("`loaded_values_and_other_scenes_count`")),
+    ("OcclusionSpec.method", Ok("o.method=random")),
+    ("OcclusionSpec.samples", Ok("o.samples=5")),
+    ("OcclusionSpec.target_error", Err("`loaded_values_and_other_scenes_count`")),
+    ("OcclusionSpec.max_samples", Err("`loaded_values_and_other_scenes_count`")),
+    ("OcclusionSpec.max_cones", Err("a bound on the work: within it values don't depend on it")),
+    ("OcclusionSpec.max_distance", Ok("o.max_distance=4")),
+    ("OcclusionSpec.file", Err("values don't depend on where they are kept")),
+    ("OcclusionSpec.load", Err("`loaded_values_and_other_scenes_count`")),
+    ("OcclusionSpec.seed", Ok("o.seed=3")),
+    ("RenderSpec.id", Err("a name for other stages")),
+    ("RenderSpec.input", Err("`loaded_values_and_other_scenes_count`")),
+    ("RenderSpec.occlusion", Ok("r.occlusion=o2")),
+    ("RenderSpec.camera", Err("its keys follow")),
+    ("RenderSpec.dimensions", Ok("r.dimensions=[3, 4, 6]")),
+    ("RenderSpec.shading", Ok("r.shading=flat")),
+    ("RenderSpec.visibility", Err("changes the time, never the image")),
+    ("CameraSpec.projection", Ok("r.camera.projection=parallel")),
+    ("CameraSpec.eye", Ok("r.camera.eye=[0, 0, 0, 3]")),
+    ("CameraSpec.target", Ok("r.camera.target=[0, 0, 0, 0.5]")),
+    ("CameraSpec.field_of_view", Ok("r.camera.field_of_view=61")),
+    ("CameraSpec.height", Ok("parallel.camera.height=3")),
+    ("CameraSpec.up", Ok("r.camera.up=[1, 1, 0, 0]")),
+    ("CameraSpec.over", Ok("r.camera.over=[1, 0, 1, 0]")),
+    ("WriteSpec.id", Err("a name for other stages")),
+    ("WriteSpec.input", Ok("w.input=parallel")),
+    ("WriteSpec.vti", Err("a file doesn't depend on its name")),
+    ("WriteSpec.raw", Err("a file doesn't depend on its name")),
+    ("WriteSpec.vtu", Err("a file doesn't depend on its name")),
+    ("WriteSpec.png", Err("a file doesn't depend on its name")),
+    ("WriteSpec.arrays", Ok("w.arrays=[opacity, rgba]")),
+    ("WriteSpec.encoding", Ok("w.encoding=inline")),
+    ("WriteSpec.compression", Ok("w.compression=zlib")),
+    ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.state", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.screenshot", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.reader", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.cut", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.size", Err("a state is held against the file that is there, whole")),
+];
+
+/// The key of each file of a pipeline.
+fn keys(folder: &Path, text: &str, sets: &[&str]) -> BTreeMap<String, String> {
+    let path = folder.join("p.yaml");
+    let document = Document::parse(path.to_str().unwrap(), text).unwrap();
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    let plan = Pipeline::from_document(document, &sets, None).unwrap_or_else(|e| panic!("{sets:?}: {e}")).plan;
+    let keys = Keys::new(&plan);
+    let outputs = (0..plan.stages.len()).flat_map(|stage| plan.outputs(stage, &keys));
+    outputs.map(|output| (output.file.to_str().unwrap().to_owned(), output.key)).collect()
+}
+
+/// The files whose keys differ.
+fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> BTreeSet<String> {
+    assert!(a.keys().eq(b.keys()));
+    a.iter().filter(|(file, key)| b[*file] != **key).map(|(file, _)| file.clone()).collect()
+}
+
+#[test]
+fn every_key_counts_or_has_a_reason() {
+    let schema = schema();
+    let mut known: BTreeSet<String> = BTreeSet::new();
+    let mut add = |name: &str, definition: &Value| {
+        let properties = definition["properties"].as_object().unwrap();
+        known.extend(properties.keys().map(|key| format!("{name}.{key}")));
+    };
+    add("PipelineSpec", &schema);
+    for (name, definition) in schema["$defs"].as_object().unwrap() {
+        let of_stage = ["SceneSpec", "OcclusionSpec", "RenderSpec", "CameraSpec", "WriteSpec", "ParaviewSpec"];
+        // Of a new stage nothing is known here yet.
+        let kinds = schema["$defs"]["StageSpec"].to_string();
+        if of_stage.contains(&name.as_str()) || kinds.contains(&format!("#/$defs/{name}\"")) {
+            add(name, definition);
+        }
+    }
+    let listed: BTreeSet<String> = CHANGES.iter().map(|(key, _)| key.to_string()).collect();
+    assert_eq!(known, listed, "every key needs a change, or a reason why it needs none");
+
+    let folder = tempfile::tempdir().unwrap();
+    let before = keys(folder.path(), PIPELINE, &[]);
+    assert_eq!(before, keys(folder.path(), PIPELINE, &[]), "the same twice");
+    for (key, change) in CHANGES {
+        match change {
+            Ok(set) => {
+                let changed = differing(&before, &keys(folder.path(), PIPELINE, &[set]));
+                assert!(!changed.is_empty(), "{key}: {set} changes no key");
+            }
+            Err(reason) => assert!(!reason.is_empty(), "{key}"),
+        }
+    }
+    for set in ["r.visibility=rasterize", "exact.max_cones=2000"] {
+        assert!(differing(&before, &keys(folder.path(), PIPELINE, &[set])).is_empty(), "{set}");
+    }
+}
+
+#[test]
+fn every_object_s_field_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let before = keys(folder.path(), PIPELINE, &[]);
+    let all: BTreeSet<String> = before.keys().cloned().collect();
+    for set in [
+        "s.objects[0].name=two",
+        "s.objects[0].color=[1, 0, 0.5]",
+        "s.objects[0].orientation=input",
+        "s.objects[0].transform=[{translate: [0, 0, 0, -1.1]}]",
+        "s.objects[0].tesseract.size=0.51",
+    ] {
+        assert_eq!(differing(&before, &keys(folder.path(), PIPELINE, &[set])), all, "{set}");
+    }
+    // What faces the eye depends on where the first camera is.
+    let moved = differing(&before, &keys(folder.path(), PIPELINE, &["r.camera.eye=[0, 0, 0, 3]"]));
+    assert_eq!(moved, all);
+}
+
+#[test]
+fn a_scene_s_dimension_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "name: p\nstages:\n  - scene: {dimension: 4, objects: []}\n  - occlusion: {file: a.f32}\n";
+    let (four, three) = (keys(folder.path(), text, &[]), keys(folder.path(), text, &["scene.dimension=3"]));
+    assert_eq!(differing(&four, &three).len(), 1);
+}
+
+#[test]
+fn loaded_values_and_other_scenes_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    let text = "name: p
+stages:
+  - scene: {id: a, objects: [{tesseract: {size: 1}}]}
+  - scene: {id: b, objects: [{tesseract: {size: 2}}]}
+  - occlusion: {id: o, input: a, load: v.f32, file: o.f32}
+  - occlusion: {id: t, input: a, target_error: 0.1, max_samples: 100, file: t.f32}
+  - render: {id: r, input: a, occlusion: none, dimensions: [2, 2, 2]}
+  - write: {raw: r.raw}
+";
+    write("v.f32", b"1234");
+    let mut before = keys(folder.path(), text, &[]);
+    let mut check = |sets: &[&str], file: &str| {
+        let after = keys(folder.path(), text, sets);
+        assert_eq!(differing(&before, &after), BTreeSet::from([file.to_owned()]), "{sets:?}");
+        if sets.is_empty() {
+            before = after;
+        }
+    };
+    check(&["o.input=b"], "o.f32");
+    check(&["t.target_error=0.2"], "t.f32");
+    check(&["t.max_samples=101"], "t.f32");
+    check(&["r.input=b"], "r.raw");
+    // The file, and what may stand beside it.
+    for name in ["v.f32", "v.f32.yaml", "v.error.f32"] {
+        write(name, b"4321");
+        check(&[], "o.f32");
+    }
+    std::fs::rename(folder.path().join("v.f32"), folder.path().join("w.f32")).unwrap();
+    write("v.f32", b"4322");
+    check(&["o.load=w.f32", "o.load=v.f32"], "o.f32");
+}
+
+#[test]
+fn no_plan_hides_a_field() {
+    // What is skipped when a plan is serialised takes part in no key, and needs no reason: so nothing may be.
+    let mut open = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src/stages")];
+    let mut files = 0;
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(path).unwrap().map(|e| e.unwrap().path()));
+            continue;
+        }
+        files += 1;
+        for line in std::fs::read_to_string(&path).unwrap().lines() {
+            let hides = line.trim_start().starts_with("#[serde(") && line.contains("skip");
+            assert!(!hides, "{}: {line}", path.display());
+        }
+    }
+    assert!(files > 15, "{files}");
+}
