@@ -32,7 +32,8 @@ use nalgebra::Matrix3;
 use self::complex::{Complex, Side};
 use self::kernel::{Deepest, Plane, deepest};
 use crate::geometry::Vector64;
-use crate::mesh::topology::{corners, enclosed_volume, facet_pairs, sort_with_parity};
+use crate::mesh::facets::sort_with_parity;
+use crate::mesh::topology::{corners, enclosed_volume, facet_pairs};
 use crate::mesh::{MeshBuilder, Orientation, Surface};
 use crate::progress::Progress;
 
