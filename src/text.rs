@@ -53,6 +53,18 @@ pub fn for_markdown(text: &str) -> Cow<'_, str> {
     })
 }
 
+/// The text, or its beginning and its end if it is longer than `most` characters.
+pub fn shortened(text: &str, most: usize) -> Cow<'_, str> {
+    let count = text.chars().count();
+    if count <= most {
+        return Cow::Borrowed(text);
+    }
+    let half = most / 2;
+    let start: String = text.chars().take(half).collect();
+    let end: String = text.chars().skip(count - half).collect();
+    Cow::Owned(format!("{start} ... {end}"))
+}
+
 fn replaced(text: &str, with: impl Fn(char) -> Option<String>) -> Cow<'_, str> {
     if text.chars().all(|c| with(c).is_none()) {
         return Cow::Borrowed(text);

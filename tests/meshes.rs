@@ -219,7 +219,7 @@ fn fields_stand_anywhere_in_a_legacy_file() {
         let name = format!("{i}.vtk");
         folder.is_cube(&name, text);
         let text = Info::read(&folder.0.path().join(&name)).unwrap().to_string();
-        for told in ["TIME: 172800", "CYCLE: 2", "by: me and you", "  a ", "  v ", "  c "] {
+        for told in ["TIME: 172800", "CYCLE: 2", "by: me and you", "  a, ", "  v, ", "  c, "] {
             assert!(text.contains(told), "{name}: {told} is missing in {text}");
         }
     }

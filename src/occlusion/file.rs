@@ -42,7 +42,7 @@ pub enum FileError {
     Value { index: usize, value: f32 },
     #[error("its sidecar lacks `{0}`")]
     Sidecar(&'static str),
-    #[error("its sidecar can't be read: {0}")]
+    #[error("its sidecar can't be read: {}", crate::text::shortened(.0, 1000))]
     SidecarText(String),
     #[error(
         "it was computed for another mesh ({found} instead of {expected}); compute it again, or load it into the scene it belongs to"

@@ -1,5 +1,6 @@
 //! What can be wrong with a pipeline before it runs, each complaint with its place.
 
+use crate::text::shortened;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -42,14 +43,16 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: ", self.place)?;
         if !self.path.is_empty() {
-            write!(f, "{}: ", self.path)?;
+            write!(f, "{}: ", shortened(&self.path, LONGEST_QUOTE))?;
         }
-        f.write_str(&self.message)
+        f.write_str(&shortened(&self.message, LONGEST_MESSAGE))
     }
 }
 
-/// Characters of an override that a message quotes.
+/// Characters of an override, or of a path, that a message quotes.
 const LONGEST_QUOTE: usize = 200;
+/// Characters of what is wrong, which may quote what was written.
+const LONGEST_MESSAGE: usize = 1000;
 
 /// Where a value was written.
 #[derive(Clone, Debug, PartialEq)]

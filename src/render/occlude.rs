@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
+use super::NOTHING;
 use super::gbuffer::{Columns, GBuffer};
-use super::{NOTHING, Renderer};
 use crate::occlusion::{Error, Estimator};
 use crate::progress::Progress;
-use crate::trace::ShadingPoint;
+use crate::trace::{RayBackend, ShadingPoint};
 
 /// What a visible point is made of.
 pub(super) const COLUMNS: Columns = Columns::SIMPLEX.union(Columns::POSITION).union(Columns::NORMAL);
@@ -16,7 +16,7 @@ pub(super) const COLUMNS: Columns = Columns::SIMPLEX.union(Columns::POSITION).un
 /// # Errors
 /// Those of the estimator.
 pub(super) fn occlude<const D: usize>(
-    renderer: &Renderer<D>,
+    backend: &dyn RayBackend<D>,
     estimator: Estimator,
     buffer: &mut GBuffer<D>,
     progress: &dyn Progress,
@@ -35,7 +35,7 @@ pub(super) fn occlude<const D: usize>(
         let n = first + seen[place];
         format!("voxel ({}, {}, {})", n % width, n / width % height, n / width / height)
     };
-    let found = estimator.estimate(&*renderer.backend, &points, None, progress).map_err(|error| error.placed(voxel))?;
+    let found = estimator.estimate(backend, &points, None, progress).map_err(|error| error.placed(voxel))?;
     for ((&i, value), found_error) in seen.iter().zip(found.values).zip(found.errors) {
         if let Some(occlusion) = buffer.occlusion.get_mut(i) {
             *occlusion = value.clamp(0.0, 1.0);

@@ -88,10 +88,10 @@ impl<const D: usize> Renderer<D> {
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
             let mut buffer = pass.layers(layers, columns, progress)?;
             match self.shading {
-                Shading::Voxel(estimator) => occlude::occlude(self, estimator, &mut buffer, progress)?,
+                Shading::Voxel(estimator) => occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?,
                 Shading::Auto(_, estimator) => {
                     buffer.interpolated.copy_from_slice(&buffer.occlusion);
-                    occlude::occlude(self, estimator, &mut buffer, progress)?;
+                    occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?;
                 }
                 Shading::None | Shading::Flat(_) | Shading::Smooth(_) => {}
             }

@@ -212,7 +212,7 @@ impl Stage for RenderPlan {
         }
         let samples = (render.supersample.pow(axes) * size_of::<u32>()) as u64;
         // Filters keep the layers that they look at.
-        let layers = if axes == 3 { 1 + halo } else { 1 };
+        let layers = if axes == 3 { (1 + halo).min(render.dimensions[2] as u64) } else { 1 };
         let voxel = samples + layers * columns.bytes::<4>() as u64 + arrays;
         Needs { memory: (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel), disk: 0 }
     }

@@ -47,7 +47,7 @@ fn estimates_are_calibrated<const D: usize>() {
         let exact = scene.exact(&tracer);
         for sampler in [Sampler::Sobol, Sampler::Random] {
             for samples in [64, 256, 1000, 1024] {
-                let found = against_exact(&scene, &tracer, &exact, 6, |seed| sampling(sampler, samples, seed));
+                let found = against_exact(&scene, &tracer, &exact, 24, |seed| sampling(sampler, samples, seed));
                 assert!(found.iter().all(|(e, _)| e.error >= 1.5 / samples as f32 && e.rays == samples));
                 let differ: Vec<_> = found.iter().filter(|(e, _)| e.value > 0.0 && e.value < 1.0).collect();
                 assert!(differ.len() >= 20, "{}: only {} values whose rays differ", scene.name, differ.len());

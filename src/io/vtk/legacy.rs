@@ -41,7 +41,8 @@ pub(super) fn read(bytes: &[u8], wanted: Wanted<'_>) -> Result<DataSet, Problem>
 #[derive(Default)]
 struct Parts {
     kind: String,
-    points: Vec<[f64; 3]>,
+    /// None before the file has told them.
+    points: Option<Vec<[f64; 3]>>,
     cells: Vec<Vec<u32>>,
     types: Vec<u8>,
     /// Vertices, lines, polygons and strips of POLYDATA, in the order in which VTK numbers them.
@@ -75,7 +76,7 @@ impl Parts {
                     let count = file.whole()?;
                     let kind = file.kind()?;
                     let numbers = file.numbers(count.checked_mul(3), kind)?.to_f64();
-                    self.points = numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+                    self.points = Some(numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect());
                 }
                 b"CELLS" => self.cells = file.cells(offsets_apart)?,
                 b"CELL_TYPES" => {
@@ -154,11 +155,12 @@ impl Parts {
         if self.kind == "STRUCTURED_POINTS" {
             return self.image();
         }
+        let Some(points) = self.points else { return Err(wrong("is cut off: it has no POINTS")) };
         if self.types.len() != self.cells.len() {
             return Err(wrong(format!("has {} cells and {} types of cells", self.cells.len(), self.types.len())));
         }
         let mut grid = UnstructuredGrid {
-            points: self.points,
+            points,
             point_arrays: self.point_arrays,
             cell_arrays: self.cell_arrays,
             field_data: self.field_data,
