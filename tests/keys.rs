@@ -7,10 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use ao4d::pipeline::{Document, Pipeline, schema};
-use ao4d::stages::Keys;
+use ao4d::stages::key::without;
+use ao4d::stages::{Keys, Plan};
 use serde_json::Value;
 
-/// Every key of every stage is there but for `load`, and `max_samples` and `target_error` beside `samples`.
+/// Every key of every stage is there but for `max_samples` and `target_error` beside `samples`.
 const PIPELINE: &str = "name: p
 seed: 1
 stages:
@@ -19,9 +20,10 @@ stages:
   - scene: {id: other, objects: []}
   - occlusion: {id: o, input: s, method: sobol, samples: 4, max_distance: 3, file: o.f32, seed: 2}
   - occlusion: {id: o2, input: s, samples: 8}
+  - occlusion: {id: loaded, input: s, load: v.f32}
   - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
   - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
-  - render: {id: parallel, input: s, dimensions: [3, 4, 5], camera: {projection: parallel, height: 2}}
+  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, camera: {projection: parallel, height: 2}}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
   - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
@@ -53,6 +55,9 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("RenderSpec.camera", Err("its keys follow")),
     ("RenderSpec.dimensions", Ok("r.dimensions=[3, 4, 6]")),
     ("RenderSpec.shading", Ok("r.shading=flat")),
+    ("RenderSpec.denoise", Ok("parallel.denoise=false")),
+    ("RenderSpec.supersample", Ok("parallel.supersample=2")),
+    ("RenderSpec.dilate", Ok("parallel.dilate=2")),
     ("RenderSpec.visibility", Err("changes the time, never the image")),
     ("CameraSpec.projection", Ok("r.camera.projection=parallel")),
     ("CameraSpec.eye", Ok("r.camera.eye=[0, 0, 0, 3]")),
@@ -77,14 +82,25 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("ParaviewSpec.reader", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.cut", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.size", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.style", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.color_by", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.colorbar", Err("a state is held against the file that is there, whole")),
 ];
+
+/// The plan of a pipeline in a folder with a file of values.
+fn plan(folder: &Path, text: &str, sets: &[&str]) -> Plan {
+    let values = folder.join("v.f32");
+    if !values.exists() {
+        std::fs::write(values, "").unwrap();
+    }
+    let document = Document::parse(folder.join("p.yaml").to_str().unwrap(), text).unwrap();
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    Pipeline::from_document(document, &sets, None).unwrap_or_else(|e| panic!("{sets:?}: {e}")).plan
+}
 
 /// The key of each file of a pipeline.
 fn keys(folder: &Path, text: &str, sets: &[&str]) -> BTreeMap<String, String> {
-    let path = folder.join("p.yaml");
-    let document = Document::parse(path.to_str().unwrap(), text).unwrap();
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    let plan = Pipeline::from_document(document, &sets, None).unwrap_or_else(|e| panic!("{sets:?}: {e}")).plan;
+    let plan = plan(folder, text, sets);
     let keys = Keys::new(&plan);
     let outputs = (0..plan.stages.len()).flat_map(|stage| plan.outputs(stage, &keys));
     outputs.map(|output| (output.file.to_str().unwrap().to_owned(), output.key)).collect()
@@ -194,6 +210,46 @@ stages:
     std::fs::rename(folder.path().join("v.f32"), folder.path().join("w.f32")).unwrap();
     write("v.f32", b"4322");
     check(&["o.load=w.f32", "o.load=v.f32"], "o.f32");
+}
+
+/// The places of all numbers, words and empty lists in a value.
+fn leaves(value: &Value, at: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(map) if !map.is_empty() => {
+            map.iter().for_each(|(key, inner)| leaves(inner, &format!("{at}/{key}"), found));
+        }
+        Value::Array(items) if !items.is_empty() => {
+            items.iter().enumerate().for_each(|(i, inner)| leaves(inner, &format!("{at}/{i}"), found));
+        }
+        _ => found.push(at.to_owned()),
+    }
+}
+
+#[test]
+fn every_field_of_every_plan_counts_or_has_a_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(folder.path(), PIPELINE, &[]);
+    let (mut changed, mut reasons) = (0, BTreeMap::new());
+    for stage in 0..plan.stages.len() {
+        let (fields, left_out) = (plan.fields(stage), plan.left_out(stage));
+        for field in left_out {
+            assert!(field.reason.len() > 10, "{field:?}");
+            *reasons.entry((plan.kind(stage), field.field)).or_insert(false) |= fields.pointer(field.field).is_some();
+        }
+        let mut places = Vec::new();
+        leaves(&fields, "", &mut places);
+        for place in places {
+            let mut other = fields.clone();
+            *other.pointer_mut(&place).unwrap() = "something else".into();
+            let same = without(other, left_out) == without(fields.clone(), left_out);
+            let has_reason = left_out.iter().any(|f| place == f.field || place.starts_with(&format!("{}/", f.field)));
+            assert_eq!(same, has_reason, "{} {place}", plan.kind(stage));
+            changed += usize::from(!same);
+        }
+    }
+    assert!(changed > 60, "{changed}");
+    let stale: Vec<_> = reasons.iter().filter(|(_, found)| !**found).map(|(field, _)| field).collect();
+    assert!(stale.is_empty(), "reasons for fields that no plan has: {stale:?}");
 }
 
 #[test]

@@ -232,7 +232,6 @@ pub struct WritePlan {
     /// What the image data holds, in this order.
     pub arrays: Vec<Aov>,
     /// Whether the pipeline says which; else figures may add what they need.
-    #[serde(skip)]
     pub arrays_given: bool,
     /// How it stores numbers.
     pub encoding: Encoding,
@@ -298,6 +297,7 @@ impl Stage for WritePlan {
     const LEFT_OUT: &'static [LeftOut] = &[
         LeftOut::new("/render", "the key of the render itself takes part"),
         LeftOut::new("/files", "a file doesn't depend on its name, nor on what else is written"),
+        LeftOut::new("/arrays_given", "decides what figures add to the arrays; what they are in the end takes part"),
     ];
 
     fn id(spec: &WriteSpec) -> Option<&str> {
@@ -414,6 +414,7 @@ impl Stage for WritePlan {
         for (key, value) in shown {
             match value {
                 Value::Object(files) if key == "files" => fields.extend(files),
+                _ if key == "arrays_given" => {}
                 value => drop(fields.insert(key, value)),
             }
         }
