@@ -58,6 +58,9 @@ fn root(parents: &mut [usize], mut face: usize) -> usize {
     face
 }
 
+/// Half a turn, in millionths.
+const HALF_TURN: i64 = 3_141_593;
+
 /// Sorts the faces around an edge by their angle, counterclockwise as seen from where the edge points to.
 fn sort_around(complex: &Complex, loops: &[Vec<u32>], edge: [u32; 2], around: &mut [(usize, bool)]) {
     let [from, to] = edge.map(|i| complex.points[i as usize]);
@@ -70,11 +73,14 @@ fn sort_around(complex: &Complex, loops: &[Vec<u32>], edge: [u32; 2], around: &m
     };
     let x = across(around[0].0);
     let y = along.cross(&x);
+    // In millionths, so that faces on each other, as where two bodies touch, have one angle, also where it jumps.
     let angle = |face: usize| {
         let v = across(face);
-        libm::atan2(v.dot(&y), v.dot(&x))
+        let angle = (libm::atan2(v.dot(&y), v.dot(&x)) * 1e6).round() as i64;
+        if angle < -HALF_TURN + 2 { HALF_TURN } else { angle }
     };
-    around.sort_by(|a, b| angle(a.0).total_cmp(&angle(b.0)).then(a.cmp(b)));
+    // Of faces on each other, one ends the solid of its body before the other begins that of the next.
+    around.sort_by_key(|&(face, along)| (angle(face), !along, face));
 }
 
 /// How many cuts are looked at more closely.
