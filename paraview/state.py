@@ -259,7 +259,7 @@ def place_camera(v, bounds, aspect, above, below=0.0):
 
 
 def show_bar(v):
-    """The colour bar of ambient occlusion, where it is wanted: of the colour map, or of how far a colour is darkened."""
+    """The colour bar of ambient occlusion, if wanted: of the colour map, or of how far a colour is darkened."""
     if not COLORBAR:
         return
     bar = GetScalarBar(GetColorTransferFunction('ambient_occlusion'), v)

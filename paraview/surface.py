@@ -191,8 +191,8 @@ def frame_of(solids):
 
 def show_frame(box, labels, v):
     """The edges of the frame that lie behind the bodies, from wherever one looks, and the names of the axes."""
-    setp(v.AxesGrid, Visibility=1, UseCustomBounds=1, CustomBounds=box, XTitle='', YTitle='', ZTitle='', CullFrontface=1,
-         CullBackface=0, ShowGrid=0, ShowEdges=1, ShowTicks=0, GridColor=LINES, AxesToLabel=0,
+    setp(v.AxesGrid, Visibility=1, UseCustomBounds=1, CustomBounds=box, XTitle='', YTitle='', ZTitle='',
+         CullFrontface=1, CullBackface=0, ShowGrid=0, ShowEdges=1, ShowTicks=0, GridColor=LINES, AxesToLabel=0,
          XAxisUseCustomLabels=1, YAxisUseCustomLabels=1, ZAxisUseCustomLabels=1,
          XAxisLabels=[], YAxisLabels=[], ZAxisLabels=[])
     out = 0.035 * largest(box[2 * a + 1] - box[2 * a] for a in range(3))

@@ -80,7 +80,7 @@ fn vtk_reads_a_run_as_it_was_written() {
         }
         assert_eq!(numbers(&read["image.raw"]["voxel"]), numbers(&vti["voxel"]["rgb"]));
         let vtu = &read["mesh.vtu"];
-        assert_eq!((vtu["points"].as_u64(), vtu["cells"].as_u64()), (Some(32), Some(96)));
+        assert_eq!((vtu["points"].as_u64(), vtu["cells"].as_u64()), (Some(128), Some(96)));
         assert_eq!(vtu["kinds"], serde_json::json!([10]), "tetrahedra");
         for array in &mesh.point_arrays {
             let sum: f64 = array.values.to_f64().iter().sum();

@@ -200,7 +200,7 @@ fn foreign_files_are_named() {
     assert!(message(b"").contains("empty"));
     assert!(message(b"\x89PNG\r\n\x1a\n....").contains("not a VTK file"));
     assert!(message(b"solid ant\nfacet").contains("begins with \"solid ant"));
-    assert!(message(b"# vtk DataFile Version 3.0\n").contains("save it as `.vti`"));
+    assert!(message(b"# vtk DataFile Version 3.0\n").contains("cut off"));
     assert!(message(b"<VTKFile type=\"Table\"><Table/></VTKFile>").contains("holds Table"));
     let missing = ao4d::io::vtk::read_volume(Path::new("does/not/exist.vti")).unwrap_err().to_string();
     assert!(missing.contains("does/not/exist.vti"), "{missing}");
