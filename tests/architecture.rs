@@ -70,6 +70,15 @@ const KNOWN_CIRCLES: &[&[&str]] = &[
     &["cli/console.rs", "cli/options.rs"],
     &["render/occlude.rs", "render/renderer.rs"],
     &["scene/hypersphere.rs", "scene/polytope.rs"],
+    &[
+        "stages/occlusion.rs",
+        "stages/prepare.rs",
+        "stages/render.rs",
+        "stages/run.rs",
+        "stages/scene.rs",
+        "stages/write/mod.rs",
+        "stages/write/files.rs",
+    ],
 ];
 
 /// Source text without comments, strings and tests.
