@@ -24,7 +24,7 @@ impl Check {
         if let Backend::OpenCl(places) = &settings.backend {
             OpenCl::open(places).map_err(|error| Failure::Failed(Box::new(error)))?;
         }
-        let pool = settings.pool().map_err(RunError::from)?;
+        let pool = settings.pool().map_err(RunError::Threads)?;
         for pipeline in &pipelines {
             let prepared = pool.install(|| pipeline.prepare(|_| true))?;
             prepared.notes.iter().flatten().for_each(|note| console.note(&format!("note: {note}")));

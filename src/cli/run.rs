@@ -26,7 +26,7 @@ impl Run {
         let (pipelines, settings) = self.options.load_all(console)?;
         let watch = Watch::new(console)?;
         if pipelines.len() > 1 {
-            settings.pool().map_err(RunError::from)?.install(|| check_together(&pipelines))?;
+            settings.pool().map_err(RunError::Threads)?.install(|| check_together(&pipelines))?;
         }
         let mut reports = Vec::with_capacity(pipelines.len());
         for pipeline in &pipelines {

@@ -60,7 +60,7 @@ pub enum RunError {
     InputChanged(PathBuf),
     /// Threads can't be started.
     #[error("can't start the threads; use fewer, by --threads")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
+    Threads(#[source] std::io::Error),
 }
 
 impl<E: Into<StageError>> From<E> for RunError {
@@ -77,7 +77,7 @@ impl<E: Into<StageError>> From<E> for RunError {
 /// # Errors
 /// [`RunError`]; files that were finished before stay, none is left half-written.
 pub fn run(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
-    settings.pool()?.install(|| run_here(pipeline, settings, progress))
+    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress))
 }
 
 fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {

@@ -16,10 +16,10 @@ fn what_cannot_fit_is_told_before_anything_is_computed() {
     let bytes = 4000 * 4000 * 65_535 * 26 + 7 * 6 * 5 * 12u64;
     let told = format!("out/small: {bytes} bytes are to be written, and the disk has ");
     folder.fails(&large, 3, &[&told, "elsewhere"]);
-    // One layer: the simplex that a sample sees; simplex, albedo, occlusion, coverage and object of each voxel; rgba,
-    // opacity, ambient occlusion, rgb and object of the files.
+    // One layer: the simplex that a sample sees; simplex, albedo, occlusion and coverage of each voxel; rgba,
+    // opacity, ambient occlusion and rgb of the files.
     let deep = ["--set", "image.dimensions=[65535, 65535, 1]", "--set", "ao.samples=16777216"];
-    let bytes = 65_535u64 * 65_535 * (4 + (4 + 12 + 4 + 4 + 2) + (4 + 4 + 4 + 12 + 2));
+    let bytes = 65_535u64 * 65_535 * (4 + (4 + 12 + 4 + 4) + (4 + 4 + 4 + 12));
     let told = format!("render image: one layer of its picture takes {bytes} bytes of memory, and ");
     folder.fails(&deep, 3, &[&told]);
     assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());

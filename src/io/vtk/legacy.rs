@@ -43,7 +43,7 @@ struct Parts {
     kind: String,
     /// None before the file has told them.
     points: Option<Vec<[f64; 3]>>,
-    cells: Vec<Vec<u32>>,
+    cells: Option<Vec<Vec<u32>>>,
     types: Vec<u8>,
     /// Vertices, lines, polygons and strips of POLYDATA, in the order in which VTK numbers them.
     flat: [Vec<Vec<u32>>; 4],
@@ -78,7 +78,7 @@ impl Parts {
                     let numbers = file.numbers(count.checked_mul(3), kind)?.to_f64();
                     self.points = Some(numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect());
                 }
-                b"CELLS" => self.cells = file.cells(offsets_apart)?,
+                b"CELLS" => self.cells = Some(file.cells(offsets_apart)?),
                 b"CELL_TYPES" => {
                     let count = file.whole()?;
                     let types = file.numbers(Some(count), Kind::I32)?;
@@ -156,8 +156,12 @@ impl Parts {
             return self.image();
         }
         let Some(points) = self.points else { return Err(wrong("is cut off: it has no POINTS")) };
-        if self.types.len() != self.cells.len() {
-            return Err(wrong(format!("has {} cells and {} types of cells", self.cells.len(), self.types.len())));
+        if self.kind == "UNSTRUCTURED_GRID" && self.cells.is_none() {
+            return Err(wrong("is cut off: it has no CELLS"));
+        }
+        let cells = self.cells.unwrap_or_default();
+        if self.types.len() != cells.len() {
+            return Err(wrong(format!("has {} cells and {} types of cells", cells.len(), self.types.len())));
         }
         let mut grid = UnstructuredGrid {
             points,
@@ -166,7 +170,7 @@ impl Parts {
             field_data: self.field_data,
             ..UnstructuredGrid::default()
         };
-        self.cells.iter().zip(&self.types).for_each(|(cell, &kind)| grid.push(kind, cell));
+        cells.iter().zip(&self.types).for_each(|(cell, &kind)| grid.push(kind, cell));
         for (element, cells) in ["Verts", "Lines", "Polys", "Strips"].into_iter().zip(&self.flat) {
             cells.iter().for_each(|cell| grid.push(flat_kind(element, cell.len()), cell));
         }

@@ -71,7 +71,7 @@ impl Study {
 /// # Errors
 /// [`RunError::Refused`] if there is no occlusion, or nothing in its scene; else as [`super::run`].
 pub fn study(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Study, RunError> {
-    settings.pool()?.install(|| study_here(pipeline, progress))
+    settings.pool().map_err(RunError::Threads)?.install(|| study_here(pipeline, progress))
 }
 
 fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, RunError> {
