@@ -49,7 +49,7 @@ fn values<const D: usize>(mesh: &Mesh<D>) -> Vec<f64> {
 fn cubes<const D: usize>() {
     let mesh = mesh(vec![cuboid::<D>(-1.0, 1.0, 2), cuboid::<D>(5.0, 6.0, 1)]);
     // A shading point for every facet that a vertex is on; those of the input first.
-    let (first, second) = (2 * D * 3usize.pow(D as u32 - 1), 2 * D << (D - 1));
+    let (first, second) = (2 * D * 3usize.pow(D as u32 - 1), (2 * D) << (D - 1));
     assert_eq!(mesh.objects[0].vertices, 0..first);
     assert_eq!(mesh.objects[1].vertices, first..first + second);
     let (given, _) = cuboid::<D>(-1.0, 1.0, 2);

@@ -17,7 +17,7 @@ use crate::geometry::Vector;
 
 macro_rules! columns {
     ($($(#[doc = $doc:literal])+ $field:ident $flag:ident: $type:ty = $background:expr;)+) => {
-        #[allow(non_camel_case_types)]
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
         enum Number { $($flag),+ }
 
         bitflags! {

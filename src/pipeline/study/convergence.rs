@@ -178,8 +178,7 @@ impl<const D: usize> Bench<D> {
                     * rayon::current_num_threads() as f64,
             })
         });
-        let measured = measured.collect();
-        measured
+        measured.collect()
     }
 
     /// All vertices' values, repetition after repetition, and the rays asked in all; and the seconds a vertex and thread.

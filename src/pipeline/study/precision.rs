@@ -60,8 +60,7 @@ pub fn deviations<const D: usize>(
             errors: Errors::of(values.iter().zip(&truth.values).map(|(value, truth)| value - truth)),
         })
     });
-    let found = found.collect();
-    found
+    found.collect()
 }
 
 /// Rays of one kind, and on how many of them plain arithmetic says hit where nothing is hit, or the other way round.
@@ -97,8 +96,7 @@ pub fn differing<const D: usize>(
         progress.advance(RAYS as u64);
         Ok(Differing { aim, hit, single, double })
     });
-    let found = found.collect();
-    found
+    found.collect()
 }
 
 /// Whether a ray hits, by exact signs, and whether `f32` and `f64` say otherwise. It is aimed at the middle of a simplex's

@@ -308,7 +308,8 @@ impl<const D: usize> Denoise<D> {
                     let b = (there + first).wrapping_add_signed(di);
                     let b = b..b + len;
                     let (cosine, distance) = (&mut cosine[..len], &mut distance[..len]);
-                    (cosine.fill(0.0), distance.fill(0.0));
+                    cosine.fill(0.0);
+                    distance.fill(0.0);
                     for d in 0..D {
                         let (na, nb) = (&planes.normal[d][a.clone()], &planes.normal[d][b.clone()]);
                         let (pa, pb) = (&planes.position[d][a.clone()], &planes.position[d][b.clone()]);

@@ -1,7 +1,7 @@
 //! Image filters: what looks at the neighbours of a voxel, layer upon layer.
 //!
 //! A filter says which columns of the G-buffer it reads and how many layers it looks at on either side (its halo), and
-//! gets just those, however thick the slabs are that an image is made in. [`Chain`] keeps the layers that a filter may
+//! gets just those, however thick the slabs are that an image is made in. `Chain` keeps the layers that a filter may
 //! still look at, so that none is made twice; what a filter makes of a layer depends on that layer and its halo alone, so
 //! the image is the same bytes for slabs of any thickness.
 //!

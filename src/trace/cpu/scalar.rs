@@ -32,7 +32,7 @@ pub fn estimate_at<const D: usize>(
     let mut sequence = Sequence::new(sampling.sampler, sampling.seed, point.number());
     let mut accumulator = Accumulator::new(sampling.sampler);
     while accumulator.rays() < sampling.samples && !sampling.target.is_some_and(|target| target.is_met(&accumulator)) {
-        if accumulator.rays() % RAYS_BETWEEN_LOOKS == 0 && progress.cancelled() {
+        if accumulator.rays().is_multiple_of(RAYS_BETWEEN_LOOKS) && progress.cancelled() {
             return Err(Cancelled);
         }
         let visible = surroundings.is_visible(tracer, sequence.next_direction(&frame), sampling.max_distance);
