@@ -369,7 +369,7 @@ def layout_size():
 
 def text_size():
     """The height of text on a display, so that captions fit their panels."""
-    return int(largest(6, smallest(24, layout_size()[0] / panel_grid()[0] / 42.0)))
+    return int(largest(6, smallest(24, layout_size()[0] / panel_grid()[0] / 26.0)))
 
 
 def split_cell(layout, cell, parts, horizontally):

@@ -24,7 +24,9 @@ fn the_example_works() {
 fn a_session_makes_what_a_run_writes() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/two_tetrahedra.yaml");
     let out = tempfile::tempdir().unwrap();
-    let pipeline = Pipeline::load(path.as_ref(), &[], Some(out.path().to_owned())).unwrap();
+    // A session's pictures are looked at once a voxel, and nothing looks at neighbours, unless its caller says so.
+    let plain = ["with-ao.supersample=1".to_owned(), "with-ao.dilate=0".to_owned()];
+    let pipeline = Pipeline::load(path.as_ref(), &plain, Some(out.path().to_owned())).unwrap();
     run(&pipeline, &Settings::default(), &Silent).unwrap();
     let Some(AnyMesh::Four(mesh)) = pipeline.prepare(|_| true).unwrap().meshes.remove(0) else { panic!("not in 4D") };
     // It outlives everything it was made with, and can be handed to another thread.
