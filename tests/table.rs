@@ -38,7 +38,7 @@ fn rows<const D: usize>() -> Vec<Row> {
     let floor = || cuboid(&[-1.0, -1e3], &[0.0, 1e3]);
     let ball = |radius: f64, height: f64| {
         let translate = json!({"translate": all::<D>(&[height, 0.0])});
-        json!({"hypersphere": {"radius": radius, "subdivisions": 3}, "transform": [translate]})
+        json!({"hypersphere": {"radius": radius, "subdivisions": 4}, "transform": [translate]})
     };
     let above = |y: f64| all::<D>(&[1e-3, y, 0.3]);
     let share = |x: f64| x.powi(D as i32 - 1);
