@@ -81,8 +81,6 @@ mod tests {
             ("Reader", decoder_knows::<Reader>("zzz")),
             ("Style", decoder_knows::<Style>("zzz")),
             ("ColorBy", decoder_knows::<ColorBy>("zzz")),
-            ("Style", decoder_knows::<Style>("zzz")),
-            ("ColorBy", decoder_knows::<ColorBy>("zzz")),
             ("Axis", decoder_knows::<Axis>("zzz")),
         ] {
             assert!(!known.is_empty(), "{name}");
