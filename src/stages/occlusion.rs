@@ -509,6 +509,11 @@ impl Method {
     }
 }
 
+/// Rays that a voxel is looked at again with, to measure pictures,
+const AUDIT_RAYS: u32 = 256;
+/// none of which are a picture's own.
+const AUDIT_SEED: u64 = 0x5851_f42d_4c95_7f2d;
+
 impl OcclusionPlan {
     /// The rays that a voxel takes beside the vertices' values, for `shading: auto`: so few that what is left of their noise
     /// among the neighbours is well below the tolerance, by the same sampler, and no more than a vertex takes. None where
@@ -537,6 +542,14 @@ impl OcclusionPlan {
             target: None,
         };
         (!computation.method.is_of_the_thesis()).then_some(sampling)
+    }
+
+    /// Rays to measure pictures by: what this occlusion is meant to be, whatever its method. None for a file nobody knows
+    /// how it came about.
+    pub fn audit(&self) -> Option<Sampling> {
+        let OcclusionSource::Compute(computation) = &self.source else { return None };
+        let max_distance = computation.max_distance.map_or(f32::INFINITY, |d| d as f32);
+        Some(Sampling { max_distance, ..Sampling::new(AUDIT_RAYS, computation.seed ^ AUDIT_SEED) })
     }
 
     /// The rays that each voxel takes, if that is a fixed number of rays, for `shading: voxel`.

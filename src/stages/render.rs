@@ -22,7 +22,7 @@ use crate::occlusion::Estimator;
 use crate::render::filters::denoise::Refine;
 use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
+use crate::render::{self, Accuracy, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
 use crate::text::number;
 use crate::trace::Sampling;
 
@@ -285,6 +285,7 @@ impl Stage for RenderPlan {
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
         picture.filters = filters(plan, render, &picture);
+        picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
         let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &picture.grid, hash)?;
@@ -292,7 +293,7 @@ impl Stage for RenderPlan {
         let mut seen = 0;
         // Two passes over the voxels: what is seen, and its shade.
         let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
-        picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
+        let accuracy = picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;
             Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
         })?;
@@ -304,8 +305,11 @@ impl Stage for RenderPlan {
             run.made(&file, bytes, notes.clone())?;
         }
         let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
+        let off = accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
+            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
+        });
         Ok(format!(
-            "{} of {} voxels see something, {rate:.2} million voxels a second",
+            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
             grouped(seen),
             grouped(render.voxels())
         ))
@@ -416,6 +420,11 @@ fn filters<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<
         filters.push(Box::new(Dilate { layers: render.dilate }));
     }
     filters
+}
+
+/// An error to two digits, as far as there are four places.
+fn short(error: f64) -> String {
+    if error < 5e-5 { "less than 0.0001".to_owned() } else { format!("{error:.4}") }
 }
 
 /// Why a picture shows nothing.
