@@ -18,6 +18,7 @@ pub mod compare;
 mod error;
 pub mod image;
 mod info;
+mod pipeline;
 mod range;
 pub mod surface;
 
@@ -25,6 +26,7 @@ use std::path::Path;
 
 pub use error::Error;
 pub use info::{Description, Info};
+pub use pipeline::pipeline;
 pub use range::{ArraySummary, Range};
 
 use self::compare::{Comparison, Tolerance};
