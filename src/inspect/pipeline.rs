@@ -4,7 +4,8 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use super::Error;
-use crate::io::vtk::{self, DataSet, Field, Wanted};
+use super::compare::text_of;
+use crate::io::vtk::{self, DataSet, Wanted};
 use crate::io::{PIPELINE, png};
 use crate::occlusion::Sidecar;
 
@@ -27,7 +28,7 @@ pub fn pipeline(path: &Path) -> Result<String, Error> {
                 DataSet::Image(image) => image.field_data,
                 DataSet::Unstructured(mesh) => mesh.field_data,
             };
-            fields.iter().find(|field| matches!(field, Field::Text(name, _) if name == PIPELINE)).map(Field::text)
+            text_of(&fields, PIPELINE)
         }
         "png" => png::text(&open(path)?, PIPELINE).map_err(|cause| none(&format!("it is damaged: {cause}")))?,
         "f32" | "yaml" => {

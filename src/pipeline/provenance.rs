@@ -116,3 +116,64 @@ impl Told {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shipped(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            match path.extension() {
+                None => shipped(&path, found),
+                Some(ending) if ending == "yaml" => found.push(path),
+                Some(_) => {}
+            }
+        }
+    }
+
+    /// Every key that takes effect by a default, in some place.
+    const DEFAULTS: &str = "name: p
+stages:
+  - scene:
+      objects:
+        - {name: \"# it\", tesseract: {size: 0.5}, color: \"#00ff80\"}
+        - {isosurface: {field: tiger, grid: {min: [-1, -1, -1, -1], max: [1, 1, 1, 1], cells: 4}}}
+        - {hypersphere: {radius: 0.1}, crease_angle: off, transform: [{scale: [1, 2, 3, 4]}, {rotate: {plane: xw, degrees: 20}}]}
+  - occlusion: {}
+  - occlusion: {id: e, method: exact}
+  - occlusion: {id: t, target_error: 0.01}
+  - occlusion: {id: a, method: as_published, seed: 18446744073709551615}
+  - render: {dimensions: [4, 4, 4]}
+  - render: {id: v, occlusion: t, dimensions: [4, 4, 4], shading: voxel, camera: {projection: parallel}}
+  - render: {id: few, occlusion: t, input: t, dimensions: [4, 4, 4], shading: auto}
+  - render: {id: flat, occlusion: a, dimensions: [4, 4, 4], shading: flat}
+  - render: {id: none, occlusion: none, dimensions: [4, 4, 4]}
+  - write: {vti: a.vti}
+  - write: {input: few, png: a.png}
+  - mesh: {vtu: mesh.vtu}
+";
+
+    #[test]
+    fn what_a_file_tells_is_understood_as_the_pipeline_was() {
+        let mut all = Vec::new();
+        shipped(&Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines"), &mut all);
+        assert!(all.len() > 15);
+        let read = all.iter().map(|path| (Document::read(path).unwrap(), path.parent().unwrap().join("again.yaml")));
+        let defaults = Document::parse("p.yaml", &DEFAULTS.replace("id: none", "id: plain")).unwrap();
+        for (document, again) in read.chain([(defaults, PathBuf::from("again.yaml"))]) {
+            let file = document.file().to_owned();
+            let pipeline = Pipeline::from_document(document, &["seed=7".to_owned()], None).unwrap_or_else(|e| panic!("{e}"));
+            let told = text(&pipeline, &Keys::new(&pipeline.plan));
+            let document = Document::parse(again.to_str().unwrap(), &told).unwrap();
+            let again = Pipeline::from_document(document, &[], None).unwrap_or_else(|e| panic!("{file}: {e}\n{told}"));
+            for stage in 0..pipeline.plan.stages.len() {
+                assert_eq!(again.plan.fields(stage), pipeline.plan.fields(stage), "{file}, stage {stage}\n{told}");
+            }
+            let warnings = |p: &Pipeline| p.plan.warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
+            assert_eq!(warnings(&again), warnings(&pipeline), "{file}");
+            assert_eq!(text(&again, &Keys::new(&again.plan)), told, "{file}");
+            check(&again).unwrap();
+        }
+    }
+}

@@ -9,7 +9,7 @@ use super::{Entry, Node, Origin, Value};
 use crate::text::is_command;
 
 /// A line is not made longer than this to hold a whole list or mapping.
-const WIDTH: usize = 100;
+const WIDTH: usize = 120;
 /// Words that some YAML takes for something other than text.
 const WORDS: &[&str] = &["true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf", "infinity"];
 
@@ -119,7 +119,8 @@ fn block_item(item: &Node, indent: usize, text: &mut String) {
     text.extend(std::iter::repeat_n(' ', indent));
     let line = flow(item);
     match &item.value {
-        Value::Map(entries) if indent + line.len() >= WIDTH && !entries.is_empty() => {
+        // A stage, a step, a shape: its only key needs no braces.
+        Value::Map(entries) if entries.len() == 1 || indent + line.len() >= WIDTH && !entries.is_empty() => {
             text.push_str("- ");
             block_map(entries, indent + 2, text);
         }
@@ -219,7 +220,7 @@ stages:
   - scene:
       objects:
         - {box: {min: [0, 0], max: [1, 1]}, name: a long name of an object}
-        - {x: and another one that makes the line long}
+        - x: and another one that makes the line long
 ";
         assert_eq!(emit(&tree), expected);
     }
