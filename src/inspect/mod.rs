@@ -113,7 +113,8 @@ pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, 
     let (first, second) = (Contents::read(a)?, Contents::read(b)?);
     let mut known = first.array_names();
     known.extend(second.array_names().into_iter().filter(|name| !first.array_names().contains(name)));
-    let told = |name: &str| [&first, &second].iter().any(|contents| compare::text_of(contents.fields(), name).is_some());
+    let told =
+        |name: &str| [&first, &second].iter().any(|contents| compare::text_of(contents.fields(), name).is_some());
     let unknown = |name: &&String| !known.contains(&name.as_str()) && !told(name);
     if let Some(name) = tolerance.arrays.iter().find(unknown) {
         return Err(Error::NoArray { name: name.clone(), a: a.into(), b: b.into(), known: known.join(", ") });

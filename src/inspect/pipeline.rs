@@ -36,7 +36,8 @@ pub fn pipeline(path: &Path) -> Result<String, Error> {
             if ending == "f32" {
                 beside.push(".yaml");
             }
-            let text = String::from_utf8(open(Path::new(&beside))?).map_err(|_| none("what stands beside it is no text"))?;
+            let text =
+                String::from_utf8(open(Path::new(&beside))?).map_err(|_| none("what stands beside it is no text"))?;
             Sidecar::from_yaml(&text).map_err(|cause| none(&cause.to_string()))?.pipeline
         }
         _ => return Err(none("its format has no place for one; ask a .vti, .vtu, .png or .f32 of the same run")),

@@ -35,8 +35,8 @@ use crate::stages::write::PROGRAM;
 use crate::stages::{Invalid, Plan, suggest};
 
 pub use document::Document;
-pub use provenance::Told;
 pub use error::{Error, Place, Refusal};
+pub use provenance::Told;
 pub use report::{FileReport, Report, StageTime};
 pub use run::{RunError, run};
 pub use schema::schema;

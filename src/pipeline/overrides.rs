@@ -33,7 +33,8 @@ pub(super) fn apply(root: &mut Node, assignment: &str, origin: Origin) -> Result
         return Err(Problem::new("the key is missing")); // parse_path gives a key first
     };
     // Ids may be called as these are, which are rarely set.
-    let taken = |root: &Node| root.get("stages").is_some_and(|list| list.items().iter().any(|s| id_of(s) == Some(first)));
+    let taken =
+        |root: &Node| root.get("stages").is_some_and(|list| list.items().iter().any(|s| id_of(s) == Some(first)));
     if TOP_KEYS.contains(&first.as_str()) || (RARE_KEYS.contains(&first.as_str()) && !taken(root)) {
         return assign(root, &path, value.as_ref(), origin);
     }

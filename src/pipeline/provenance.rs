@@ -163,7 +163,8 @@ stages:
         let defaults = Document::parse("p.yaml", &DEFAULTS.replace("id: none", "id: plain")).unwrap();
         for (document, again) in read.chain([(defaults, PathBuf::from("again.yaml"))]) {
             let file = document.file().to_owned();
-            let pipeline = Pipeline::from_document(document, &["seed=7".to_owned()], None).unwrap_or_else(|e| panic!("{e}"));
+            let pipeline =
+                Pipeline::from_document(document, &["seed=7".to_owned()], None).unwrap_or_else(|e| panic!("{e}"));
             let told = text(&pipeline, &Keys::new(&pipeline.plan));
             let document = Document::parse(again.to_str().unwrap(), &told).unwrap();
             let again = Pipeline::from_document(document, &[], None).unwrap_or_else(|e| panic!("{file}: {e}\n{told}"));

@@ -59,8 +59,7 @@ impl Stage for MeshPlan {
     }
 
     fn resolve(spec: &MeshSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let (scene, occlusion) =
-            scene_and_occlusion(resolver, path, spec.input.as_deref(), spec.occlusion.as_deref())?;
+        let (scene, occlusion) = scene_and_occlusion(resolver, path, spec.input.as_deref(), spec.occlusion.as_deref())?;
         let file = resolver.outputs.claim(&format!("{path}.vtu"), &spec.vtu, Some("vtu"))?;
         Ok(Self { scene, occlusion, file })
     }

@@ -34,7 +34,8 @@ fn all_simplices_are_there_and_tell_what_they_are_in_4d() {
     for part in ["a surface in 4D: closed, 2 pieces", "\n  oriented\n", "\n  manifold\n", "encloses a 4-volume"] {
         assert!(whole.contains(part), "{part} is not in {whole}");
     }
-    for array in ["position, 4 x", "normal, 4 x", "object, 1 x UInt16: 1 to 2", "ambient_occlusion", "occlusion_error"] {
+    for array in ["position, 4 x", "normal, 4 x", "object, 1 x UInt16: 1 to 2", "ambient_occlusion", "occlusion_error"]
+    {
         assert!(whole.contains(array), "{array} is not in {whole}");
     }
     let bare = info(&folder, "out/around/bare.vtu");
@@ -73,7 +74,9 @@ stages:
         folder.runs(&["--out", "first"]);
         let again = AGAIN.replace("{objects:", &format!("{{dimension: {dimension}, objects:"));
         let place = |name: &str| format!("first/{name}");
-        let again = again.replace("whole.vtu", &place("whole.vtu")).replace("load: ao.f32", &format!("load: {}", place("ao.f32")));
+        let again = again
+            .replace("whole.vtu", &place("whole.vtu"))
+            .replace("load: ao.f32", &format!("load: {}", place("ao.f32")));
         std::fs::write(folder.path("p.yaml"), again).unwrap();
         // Values are loaded into the very mesh that they are of, and no other.
         folder.runs(&["--out", "second"]);

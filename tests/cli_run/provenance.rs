@@ -40,7 +40,11 @@ fn every_file_tells_the_pipeline_that_makes_them_all_again() {
     for name in made.keys() {
         let place = format!("out/small/{name}");
         if [".py", ".raw", ".error.f32"].iter().any(|ending| name.ends_with(ending)) {
-            refused(&folder.path(""), &["info", "--pipeline", &place], &[&place, if name.contains("error") { "no" } else { "tells of no pipeline" }]);
+            refused(
+                &folder.path(""),
+                &["info", "--pipeline", &place],
+                &[&place, if name.contains("error") { "no" } else { "tells of no pipeline" }],
+            );
             continue;
         }
         let (text, told) = prints(&folder.path(""), &["info", "--pipeline", &place]);
@@ -50,7 +54,9 @@ fn every_file_tells_the_pipeline_that_makes_them_all_again() {
     assert_eq!(texts.len(), 8);
     assert!(texts.iter().all(|text| *text == texts[0]));
     // Overrides are applied, and defaults that took effect are there.
-    for part in ["samples: 5", "eye: [0, 0.1, 0, 1.5]", "field_of_view: 90.0", "method: sobol", "shading: smooth", "seed: 1"] {
+    for part in
+        ["samples: 5", "eye: [0, 0.1, 0, 1.5]", "field_of_view: 90.0", "method: sobol", "shading: smooth", "seed: 1"]
+    {
         assert!(texts[0].contains(part), "{part} is not in\n{}", texts[0]);
     }
     std::fs::write(folder.path("again.yaml"), &texts[0]).unwrap();
@@ -110,7 +116,11 @@ stages:
     let (_, told) = prints(&root, &["info", "--pipeline", "out/nut/a.vti"]);
     assert!(told.contains("nut.vtu changed since"), "{told}");
     for verb in ["run", "check"] {
-        refused(&root, &[verb, "again.yaml"], &["again.yaml:", "inputs[0].sha256", "nut.vtu changed since: its SHA-256 is"]);
+        refused(
+            &root,
+            &[verb, "again.yaml"],
+            &["again.yaml:", "inputs[0].sha256", "nut.vtu changed since: its SHA-256 is"],
+        );
     }
     prints(&root, &["run", "again.yaml", "--set", "inputs=[]", "--out", "other"]);
     assert!(same(&folder, "other/a.vti", "out/nut/a.vti"), "compare looks at values");
@@ -158,7 +168,11 @@ fn foreign_files_tell_of_none() {
     let folder = Folder::new();
     let root = folder.path("");
     let nut = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/meshes/nut.vtu");
-    refused(&root, &["info", "--pipeline", nut.to_str().unwrap()], &["nut.vtu: tells of no pipeline: it was not made by"]);
+    refused(
+        &root,
+        &["info", "--pipeline", nut.to_str().unwrap()],
+        &["nut.vtu: tells of no pipeline: it was not made by"],
+    );
     let mut png = Vec::new();
     let grid = ao4d::volume::Grid { dimensions: [2, 2, 2], origin: [0.0; 3], spacing: [1.0; 3] };
     ao4d::io::png::write(&mut png, &[&ao4d::io::png::Slices::new(&grid)]).unwrap();
@@ -171,7 +185,9 @@ fn foreign_files_tell_of_none() {
     refused(&root, &["info", "--pipeline", "p.yaml"], &["p.yaml: tells of no pipeline"]);
     refused(&root, &["info", "--pipeline", "missing.vti"], &["there is no such file"]);
     // A field of that name with something else in it.
-    for (name, text) in [("name.vtu", "small"), ("wrong.vtu", "a: b\nstages:\n  - [\n"), ("keys.vtu", "a: b\nstages: []\n")] {
+    for (name, text) in
+        [("name.vtu", "small"), ("wrong.vtu", "a: b\nstages:\n  - [\n"), ("keys.vtu", "a: b\nstages: []\n")]
+    {
         let mut bytes = Vec::new();
         let cells = ao4d::io::vtu::Cells::Triangles(&[]);
         ao4d::io::vtu::write_told(&mut bytes, &[], cells, &[], &[], &[("pipeline", text)]).unwrap();

@@ -117,7 +117,12 @@ pub fn write<W: Write + Seek>(sink: W, volume: &Volume, settings: &Settings) -> 
 ///
 /// # Errors
 /// If it has no such text, or reading or writing fails.
-pub fn retell(mut source: impl BufRead, mut sink: impl Write, encoding: Encoding, text: (&str, &str)) -> Result<(), Error> {
+pub fn retell(
+    mut source: impl BufRead,
+    mut sink: impl Write,
+    encoding: Encoding,
+    text: (&str, &str),
+) -> Result<(), Error> {
     super::vtk::text::retell(&mut source, &mut sink, text, |head, source| {
         if encoding == Encoding::Inline {
             return Ok(());

@@ -49,7 +49,11 @@ pub(in crate::io) fn retell(
 }
 
 /// Reads tag by tag until one ends with these bytes.
-pub(in crate::io) fn read_to(source: &mut (impl BufRead + ?Sized), end: &[u8], head: &mut Vec<u8>) -> std::io::Result<()> {
+pub(in crate::io) fn read_to(
+    source: &mut (impl BufRead + ?Sized),
+    end: &[u8],
+    head: &mut Vec<u8>,
+) -> std::io::Result<()> {
     while !head.ends_with(end) {
         if source.read_until(b'>', head)? == 0 {
             return Err(std::io::ErrorKind::UnexpectedEof.into());

@@ -30,7 +30,11 @@ pub fn node(value: Value) -> Node {
 
 /// A mapping of these entries.
 pub fn map(entries: impl IntoIterator<Item = (&'static str, Value)>) -> Value {
-    let entry = |(key, value): (&str, Value)| Entry { key: key.to_owned(), origin: node(Value::Null).origin, value: node(value) };
+    let entry = |(key, value): (&str, Value)| Entry {
+        key: key.to_owned(),
+        origin: node(Value::Null).origin,
+        value: node(value),
+    };
     Value::Map(entries.into_iter().map(entry).collect())
 }
 
@@ -201,7 +205,9 @@ mod tests {
             "a: \"tab\\t, line\\nbreak, \\\"quotes\\\", back\\\\slash, \\u0007, \\u2028, \\ufeff, \\u007f, \\u0085, ä, \u{1f600}\"",
             "'': 1\n'a b': 2\n'3': 4\n'- x': 5\n? [1]\n: 6\n",
             "a: []\nb: {}\nc: [[], {}, [[]]]\n",
-            &format!("stages:\n  - scene: {{v: {long}, w: [{long}, {long}]}}\n  - {long}\n  - x: {{y: {{z: {long}}}}}\n"),
+            &format!(
+                "stages:\n  - scene: {{v: {long}, w: [{long}, {long}]}}\n  - {long}\n  - x: {{y: {{z: {long}}}}}\n"
+            ),
             "list: [[[1, 2], [3, 4]], {a: 1, b: [{c: d}]}]\n",
         ] {
             let Ok(tree) = parse(text) else { continue };

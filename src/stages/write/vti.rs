@@ -47,7 +47,9 @@ impl OutputFormat for Vti {
         copy_over(path, |source, out| vti::retell(source, out, encoding(write), (PIPELINE, text)))
     });
 
-    fn open(Opening { path, plan, write, grid, mesh_hash, told }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+    fn open(
+        Opening { path, plan, write, grid, mesh_hash, told }: Opening,
+    ) -> Result<Option<Box<dyn VoxelFile>>, Error> {
         let dimension = plan[plan[write.render].scene].dimension;
         let specs: Vec<ArraySpec> = write.arrays.iter().map(|&channel| array_spec(channel, dimension)).collect();
         let settings = settings(plan, write, mesh_hash, told, path.parent());
