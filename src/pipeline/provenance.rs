@@ -138,7 +138,7 @@ stages:
   - scene:
       objects:
         - {name: \"# it\", tesseract: {size: 0.5}, color: \"#00ff80\"}
-        - {isosurface: {field: tiger, grid: {min: [-1, -1, -1, -1], max: [1, 1, 1, 1], cells: 4}}}
+        - {isosurface: {field: {tiger: {major: [0.55, 0.55], minor: 0.24}}, grid: {cells: 4}}}
         - {hypersphere: {radius: 0.1}, crease_angle: off, transform: [{scale: [1, 2, 3, 4]}, {rotate: {plane: xw, degrees: 20}}]}
   - occlusion: {}
   - occlusion: {id: e, method: exact}

@@ -64,7 +64,7 @@ fn every_file_tells_the_pipeline_that_makes_them_all_again() {
     assert_eq!(contents(&folder.path("again")), made);
     // In the folder where they were made they are as they should be.
     let (said, _) = prints(&folder.path(""), &["run", "again.yaml"]);
-    assert_eq!(said.matches("unchanged").count(), 10, "{said}");
+    assert_eq!(said.matches("unchanged").count(), 9, "{said}");
     assert_eq!(contents(&out), made);
 }
 
@@ -72,9 +72,9 @@ fn every_file_tells_the_pipeline_that_makes_them_all_again() {
 fn inputs_are_found_again_and_held_against_what_they_were() {
     let folder = Folder::new();
     let root = folder.path("");
-    std::fs::create_dir_all(folder.path("project/meshes")).unwrap();
+    std::fs::create_dir_all(folder.path("lair/meshes")).unwrap();
     let nut = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/meshes/nut.vtu");
-    std::fs::copy(nut, folder.path("project/meshes/nut.vtu")).unwrap();
+    std::fs::copy(nut, folder.path("lair/meshes/nut.vtu")).unwrap();
     let pipeline = "name: nut
 stages:
   - scene:
@@ -85,15 +85,15 @@ stages:
   - render: {dimensions: [6, 6, 6]}
   - write: {vti: a.vti, vtu: a.vtu, png: a.png}
 ";
-    std::fs::write(folder.path("project/p.yaml"), pipeline).unwrap();
-    prints(&root, &["run", "project/p.yaml"]);
+    std::fs::write(folder.path("lair/p.yaml"), pipeline).unwrap();
+    prints(&root, &["run", "lair/p.yaml"]);
     let made = contents(&folder.path("out/nut"));
     let (text, told) = prints(&root, &["info", "--pipeline", "out/nut/a.vti"]);
     assert!(text.contains("{file: meshes/nut.vtu, sha256: ") && told.is_empty(), "{text}{told}");
     // Where the pipeline was is not in the files, and the text works from anywhere.
-    let place = folder.path("project").canonicalize().unwrap();
+    let place = folder.path("lair").canonicalize().unwrap();
     assert!(text.contains(place.to_str().unwrap()));
-    assert!(made.values().all(|bytes| !String::from_utf8_lossy(bytes).contains("project")));
+    assert!(made.values().all(|bytes| !String::from_utf8_lossy(bytes).contains("lair")));
     std::fs::write(folder.path("again.yaml"), &text).unwrap();
     prints(&root, &["run", "again.yaml", "--out", "again"]);
     assert_eq!(contents(&folder.path("again")), made);
@@ -106,11 +106,11 @@ stages:
     assert!(told.contains("relative to the folder that the pipeline was in") && text.ends_with(&moved), "{told}");
     std::fs::write(folder.path("moved.yaml"), &moved).unwrap();
     refused(&root, &["run", "moved.yaml"], &["meshes/nut.vtu"]);
-    prints(&root, &["run", "moved.yaml", "--set", "folder=project", "--out", "set"]);
+    prints(&root, &["run", "moved.yaml", "--set", "folder=lair", "--out", "set"]);
     assert_eq!(contents(&folder.path("set")), made);
 
     // A mesh that changed is told and refused.
-    let mesh = folder.path("project/meshes/nut.vtu");
+    let mesh = folder.path("lair/meshes/nut.vtu");
     let changed = std::fs::read_to_string(&mesh).unwrap() + "\n";
     std::fs::write(&mesh, changed).unwrap();
     let (_, told) = prints(&root, &["info", "--pipeline", "out/nut/a.vti"]);
