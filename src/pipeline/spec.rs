@@ -20,14 +20,14 @@ pub struct PipelineSpec {
     pub name: String,
     /// What all random numbers start from (default 0). The same seed gives the same bytes.
     pub seed: Option<u64>,
+    /// What to do, in order. A stage works on the nearest earlier stage of the kind it needs, or on the one its `input` names.
+    pub stages: Vec<StageSpec>,
     /// The program that this was written by, as files tell it; another version may make other files of it.
     pub program: Option<String>,
     /// Where relative paths of inputs start (default the pipeline's own folder).
     pub folder: Option<PathBuf>,
     /// Inputs that must be what they were. One that changed is refused.
     pub inputs: Option<Vec<InputSpec>>,
-    /// What to do, in order. A stage works on the nearest earlier stage of the kind it needs, or on the one its `input` names.
-    pub stages: Vec<StageSpec>,
 }
 
 /// An input file, and what is in it.
