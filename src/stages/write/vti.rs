@@ -108,6 +108,7 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, told: &str, scratch
         "dimensions": render.dimensions,
         "shading": render.shading,
         "denoise": render.denoise,
+        "tolerance": render.tolerance,
         "supersample": render.supersample,
         "dilate": render.dilate,
     });
