@@ -233,9 +233,9 @@ impl Stage for RenderPlan {
             "dilate": render.dilate,
         });
         // Elsewhere it has no effect, and would be warned of.
-        let rays = render.occlusion.and_then(|occlusion| plan[occlusion].rays_per_voxel(render.shading));
-        if rays.is_some() {
+        if rays_of(plan, render).is_some() {
             written["denoise"] = render.denoise.into();
+            written["tolerance"] = render.tolerance.into();
         }
         written
     }

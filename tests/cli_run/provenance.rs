@@ -54,9 +54,15 @@ fn every_file_tells_the_pipeline_that_makes_them_all_again() {
     assert_eq!(texts.len(), 8);
     assert!(texts.iter().all(|text| *text == texts[0]));
     // Overrides are applied, and defaults that took effect are there.
-    for part in
-        ["samples: 5", "eye: [0, 0.1, 0, 1.5]", "field_of_view: 90.0", "method: sobol", "shading: smooth", "seed: 1"]
-    {
+    for part in [
+        "samples: 5",
+        "eye: [0, 0.1, 0, 1.5]",
+        "field_of_view: 90.0",
+        "method: sobol",
+        "shading: auto",
+        "tolerance: 0.01",
+        "seed: 1",
+    ] {
         assert!(texts[0].contains(part), "{part} is not in\n{}", texts[0]);
     }
     std::fs::write(folder.path("again.yaml"), &texts[0]).unwrap();

@@ -13,7 +13,8 @@ use crate::occlusion::exact::Budget;
 use crate::occlusion::{Error, Estimator};
 use crate::pipeline::RunError;
 use crate::progress::Progress;
-use crate::render::filters::Denoise;
+use crate::render::filters::denoise;
+use crate::render::filters::denoise::Refine;
 use crate::render::{Aov, Renderer, Shading};
 use crate::stages::camera::camera;
 use crate::stages::render::RenderPlan;
@@ -37,7 +38,10 @@ const SHADINGS: &[(&str, &[u32])] = &[
     ("auto", &[64, 256, 1024]),
 ];
 
-/// The rays that `auto` takes at a voxel beside so many at a vertex, as a render does.
+/// The standard error to which `auto` keeps, as a render does where nothing else is said.
+const TOLERANCE: f64 = 0.01;
+
+/// The rays that `auto` takes at a voxel at first, beside so many at a vertex.
 fn rays_beside(samples: u32) -> u32 {
     (samples / 16).clamp(4, 16)
 }
@@ -87,15 +91,18 @@ pub fn measure<const D: usize>(
     let watch = Unheard(progress);
     let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Arc::clone(tracer)));
     let points = ShadingPoint::vertices(tracer.mesh());
-    // Denoised, where it is said with how many rays a voxel.
-    let filtered = |shading: Shading, rays: Option<u32>| -> Result<Vec<Array>, Error> {
+    // Denoised, where it is said with how many rays a voxel, and refined by at most so many.
+    let filtered = |shading: Shading, rays: Option<u32>, most: Option<u32>| -> Result<Vec<Array>, Error> {
         let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading);
         if let Some(rays) = rays {
-            renderer.filters.push(Box::new(Denoise::new(&renderer.camera, &renderer.grid, rays)));
+            renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, Sampling::new(rays, seed)));
+        }
+        if let Some(most) = most {
+            renderer.filters.push(Box::new(Refine::new(Arc::clone(&backend), Sampling::new(most, seed), TOLERANCE)));
         }
         Ok(renderer.volume(&[Aov::AmbientOcclusion, Aov::Opacity], &watch)?.arrays)
     };
-    let image = |shading: Shading| filtered(shading, None);
+    let image = |shading: Shading| filtered(shading, None, None);
     let by_rays = |samples| Estimator::Sampled(Sampling::new(samples, seed));
     let steps = SHADINGS.iter().map(|(_, samples)| samples.len()).sum::<usize>() + 1;
     let _running = progress.stage("study: pictures", steps as u64);
@@ -132,10 +139,10 @@ pub fn measure<const D: usize>(
                     "flat" => image(Shading::Flat(at_vertices()?)),
                     "smooth" => image(Shading::Smooth(at_vertices()?)),
                     "voxel" => image(Shading::Voxel(by_rays(samples))),
-                    "voxel+denoise" => filtered(Shading::Voxel(by_rays(samples)), Some(samples)),
+                    "voxel+denoise" => filtered(Shading::Voxel(by_rays(samples)), Some(samples), None),
                     _ => {
                         let own = rays_beside(samples);
-                        filtered(Shading::Auto(at_vertices()?, by_rays(own)), Some(own))
+                        filtered(Shading::Auto(at_vertices()?, by_rays(own)), Some(own), Some(samples))
                     }
                 }
             })?;
