@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
@@ -137,7 +138,8 @@ impl Stage for RenderPlan {
     }
 
     fn resolve(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let (scene, occlusion) = scene_and_occlusion(resolver, path, spec)?;
+        let (input, named) = (spec.input.as_deref(), spec.occlusion.as_deref());
+        let (scene, occlusion) = scene_and_occlusion(resolver, path, input, named)?;
         let dimension = resolver.plan[scene].dimension;
         let blank = CameraSpec::default();
         let camera_spec = spec.camera.as_ref().unwrap_or(&blank);
@@ -222,6 +224,22 @@ impl Stage for RenderPlan {
         Some(plan[me].scene)
     }
 
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let render = &plan[me];
+        let mut written = json!({
+            "camera": render.camera.written(),
+            "shading": render.shading,
+            "supersample": render.supersample,
+            "dilate": render.dilate,
+        });
+        // Elsewhere it has no effect, and would be warned of.
+        if rays_of(plan, render).is_some() {
+            written["denoise"] = render.denoise.into();
+            written["tolerance"] = render.tolerance.into();
+        }
+        written
+    }
+
     /// The memory of a slab of one layer: what is seen, its shade, and the arrays of the files that have to be made.
     fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
         let render = &plan[me];
@@ -288,7 +306,7 @@ impl Stage for RenderPlan {
         picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
-        let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &picture.grid, hash)?;
+        let mut files = PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), &picture.grid, hash)?;
         let aovs = files.aovs().to_vec();
         let mut seen = 0;
         // Two passes over the voxels: what is seen, and its shade.
@@ -452,18 +470,19 @@ impl Shading {
 
 /// What a render shows, and what darkens it. Named keys decide; what they leave open is the nearest earlier one; and
 /// an occlusion of another scene is refused.
-fn scene_and_occlusion(
+pub(super) fn scene_and_occlusion(
     resolver: &Resolver,
     path: &str,
-    spec: &RenderSpec,
+    input: Option<&str>,
+    occlusion: Option<&str>,
 ) -> Result<(Ref<ScenePlan>, Option<Ref<OcclusionPlan>>), Invalid> {
     let plan = &resolver.plan;
     let (mut of_scene, mut of_occlusion) = (None, None);
-    if let Some(name) = &spec.input {
+    if let Some(name) = input {
         let input = resolver.lookup(&format!("{path}.input"), name, &[ScenePlan::KIND, OcclusionPlan::KIND])?;
         (of_scene, of_occlusion) = (plan.reference::<ScenePlan>(input), plan.reference::<OcclusionPlan>(input));
     }
-    let named: Option<Ref<OcclusionPlan>> = match spec.occlusion.as_deref() {
+    let named: Option<Ref<OcclusionPlan>> = match occlusion {
         None | Some("none") => None,
         Some(name) => plan.reference(resolver.lookup(&format!("{path}.occlusion"), name, &[OcclusionPlan::KIND])?),
     };
@@ -485,7 +504,7 @@ fn scene_and_occlusion(
         }
         return Ok((scene, named));
     }
-    if spec.occlusion.is_some() {
+    if occlusion.is_some() {
         return Ok((scene, None));
     }
     if of_occlusion.is_some() {
