@@ -316,6 +316,9 @@ impl Stage for RenderPlan {
             Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
         })?;
         running.end();
+        if let Some(accuracy) = &accuracy {
+            files.tell(accuracy);
+        }
         let rendering = start.elapsed();
         let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
         let notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
