@@ -302,6 +302,7 @@ const MESH_LEFT_OUT: &[LeftOut] = &[
     LeftOut::new("/dimensions", "a mesh has no voxels"),
     LeftOut::new("/shading", "a mesh has the values of its vertices"),
     LeftOut::new("/denoise", "a mesh has no voxels"),
+    LeftOut::new("/tolerance", "a mesh has no voxels"),
     LeftOut::new("/supersample", "a mesh has no voxels"),
     LeftOut::new("/dilate", "a mesh has no voxels"),
 ];
