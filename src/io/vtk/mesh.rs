@@ -7,6 +7,7 @@ use super::Problem;
 use super::cell::{self, POLYHEDRON, TETRAHEDRON, TRIANGLE};
 use super::data_array::{array, attributes, field_data};
 use super::document::{Document, child, required};
+use super::pieces;
 use crate::volume::{Array, Values};
 
 /// Points, and cells that are lists of points.
@@ -102,8 +103,15 @@ impl UnstructuredGrid {
 
 /// The mesh in a file.
 pub(super) fn read(document: &Document<'_>) -> Result<UnstructuredGrid, Problem> {
-    let mut grid = UnstructuredGrid { field_data: field_data(document)?, ..Default::default() };
-    let Some(piece) = document.piece()? else { return Ok(grid) };
+    let pieces = document.pieces().map(|piece| read_piece(document, piece)).collect::<Result<_, _>>()?;
+    let mut grid = pieces::mesh(pieces)?;
+    grid.field_data = field_data(document)?;
+    Ok(grid)
+}
+
+/// One piece of it.
+fn read_piece(document: &Document<'_>, piece: Node<'_, '_>) -> Result<UnstructuredGrid, Problem> {
+    let mut grid = UnstructuredGrid::default();
     let points = count(piece, "NumberOfPoints")?;
     let nodes = child(piece, "Points")?.children().find(Node::is_element);
     match nodes {
