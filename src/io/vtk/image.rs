@@ -32,6 +32,15 @@ impl Image {
         Self { grid, direction: IDENTITY, point_arrays, cell_arrays, field_data }
     }
 
+    /// At what time it is, if its field data say so.
+    pub fn time(&self) -> Option<f64> {
+        let time = self.field_data.iter().find_map(|field| match field {
+            Field::Numbers(array) if array.name == "TimeValue" && !array.values.is_empty() => Some(array.values.get(0)),
+            _ => None,
+        });
+        time.filter(|time| time.is_finite())
+    }
+
     /// The image as a [`Volume`], if that loses nothing.
     ///
     /// # Errors

@@ -158,7 +158,8 @@ pub fn parse_wanted(bytes: &[u8], wanted: Wanted<'_>) -> Result<DataSet, Problem
     parse_at(bytes, wanted, None)
 }
 
-fn parse_at(bytes: &[u8], wanted: Wanted<'_>, path: Option<&Path>) -> Result<DataSet, Problem> {
+/// The same of a file that lies here.
+pub(super) fn parse_at(bytes: &[u8], wanted: Wanted<'_>, path: Option<&Path>) -> Result<DataSet, Problem> {
     if bytes.is_empty() {
         return Err(Problem::Empty);
     }
@@ -175,6 +176,16 @@ fn parse_at(bytes: &[u8], wanted: Wanted<'_>, path: Option<&Path>) -> Result<Dat
             expected: "ImageData, UnstructuredGrid or PolyData, whole or in pieces,",
         }),
     })
+}
+
+/// Meshes as one, where they have the same arrays.
+pub(super) fn joined(parts: Vec<UnstructuredGrid>) -> Result<UnstructuredGrid, Problem> {
+    pieces::mesh(parts)
+}
+
+/// Refuses XML whose shape would keep a parser busy for ever.
+pub(super) fn check_nesting(xml: &str) -> Result<(), Problem> {
+    nesting::check(xml)
 }
 
 /// Opens an XML file whose arrays may take so many bytes of memory.
