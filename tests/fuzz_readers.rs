@@ -105,7 +105,8 @@ fn collection(file: &str) -> String {
 }
 
 fn series() -> String {
-    r#"{"file-series-version": "1.0", "files": [{"name": "part.vti", "time": 0}, {"name": "part.vti", "time": 2.5}]}"#.into()
+    r#"{"file-series-version": "1.0", "files": [{"name": "part.vti", "time": 0}, {"name": "part.vti", "time": 2.5}]}"#
+        .into()
 }
 
 /// The corner tetrahedron's four triangles.

@@ -65,7 +65,9 @@ pub fn files(path: &Path) -> Vec<PathBuf> {
 pub fn is_of_images(path: &Path) -> bool {
     let Some(first) = files(path).into_iter().next() else { return false };
     match first.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
-        "vtk" => matches!(super::vtk::read_wanted(&first, super::vtk::Wanted::Named(&[])), Ok(super::vtk::DataSet::Image(_))),
+        "vtk" => {
+            matches!(super::vtk::read_wanted(&first, super::vtk::Wanted::Named(&[])), Ok(super::vtk::DataSet::Image(_)))
+        }
         ending => !super::mesh::ENDINGS.contains(&ending),
     }
 }
@@ -128,14 +130,14 @@ mod tests {
 
     #[test]
     fn steps_are_in_the_order_of_their_times() {
-        let set = |attributes: &str| {
-            format!("<VTKFile type='Collection'><Collection>{attributes}</Collection></VTKFile>")
-        };
+        let set =
+            |attributes: &str| format!("<VTKFile type='Collection'><Collection>{attributes}</Collection></VTKFile>");
         let text = set("<DataSet timestep='2' part='0' file='c.vtu'/><DataSet timestep='1.5' file='a.vtu'/>\
                         <DataSet timestep='2' part='1' file='b.vtu'/>");
         assert_eq!(steps("a.pvd", &text).unwrap(), [(Some(1.5), 1), (Some(2.0), 2)]);
         assert_eq!(steps("a.pvd", &set("<DataSet file='a.vtu'/><DataSet file='b.vtu'/>")).unwrap(), [(None, 1); 2]);
-        let json = r#"{"file-series-version": "1.0", "files": [{"name": "b", "time": 7}, {"name": "a", "time": -1e1}]}"#;
+        let json =
+            r#"{"file-series-version": "1.0", "files": [{"name": "b", "time": 7}, {"name": "a", "time": -1e1}]}"#;
         assert_eq!(steps("a.vti.series", json).unwrap(), [(Some(-10.0), 1), (Some(7.0), 1)]);
         for (text, message) in [
             (set(""), "names no file"),

@@ -94,7 +94,10 @@ fn agree(first: &Opened, other: &Opened) -> Result<(), String> {
         let length = (ends[1] - ends[0]).abs().max(a.positions.step().abs());
         size = size.max(length);
         if ends.iter().zip(others).any(|(&x, y)| !near(x, y, length)) {
-            return Err(format!("lies from {} to {} along {}, not from {} to {}", others[0], others[1], a.name, ends[0], ends[1]));
+            return Err(format!(
+                "lies from {} to {} along {}, not from {} to {}",
+                others[0], others[1], a.name, ends[0], ends[1]
+            ));
         }
         let [from, to] = [a, b].map(|axis| axis.direction.unwrap_or_default());
         if from.iter().zip(to).any(|(&x, y)| !near(x, y, 1.0)) {

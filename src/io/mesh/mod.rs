@@ -101,7 +101,8 @@ impl FileMesh {
 impl Input {
     /// Reads the mesh as simplices, by the ending of the file's name.
     pub fn read(&self) -> Result<FileMesh, InputError> {
-        let mut mesh = simplices(&self.read_cells(Wanted::Named(&[ARRAYS, GHOSTS].concat()))?).map_err(|message| self.wrong(message))?;
+        let mut mesh = simplices(&self.read_cells(Wanted::Named(&[ARRAYS, GHOSTS].concat()))?)
+            .map_err(|message| self.wrong(message))?;
         if self.ending() == "msh" {
             // Gmsh writes the curves of its geometry beside every mesh.
             mesh.notes.clear();

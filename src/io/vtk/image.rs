@@ -152,12 +152,7 @@ pub(super) fn pieces(document: &Document<'_>, whole: [i64; 6]) -> Result<Vec<Pie
 
 impl Head {
     /// The image that these pieces make.
-    pub fn image(
-        self,
-        document: &Document<'_>,
-        pieces: Vec<Piece>,
-        field_data: Vec<Field>,
-    ) -> Result<Image, Problem> {
+    pub fn image(self, document: &Document<'_>, pieces: Vec<Piece>, field_data: Vec<Field>) -> Result<Image, Problem> {
         if pieces.is_empty() {
             return Err(Problem::Missing { element: document.kind.into(), lacks: "`<Piece>`".into() });
         }

@@ -70,7 +70,9 @@ fn placed(head: &image::Head, listed: Option<[i64; 6]>, piece: &Document<'_>) ->
     let size = |e: [i64; 6], a: usize| e[2 * a + 1].checked_sub(e[2 * a]);
     if (0..3).any(|a| size(listed, a) != size(own.extent, a)) {
         let there = own.extent;
-        return Err(Problem::Pieces { problem: format!("differ: one has the extent {there:?}, by the list {listed:?}") });
+        return Err(Problem::Pieces {
+            problem: format!("differ: one has the extent {there:?}, by the list {listed:?}"),
+        });
     }
     for block in &mut blocks {
         for i in 0..6 {

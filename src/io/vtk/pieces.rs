@@ -66,8 +66,7 @@ pub(super) fn image(
         return Ok(pieces.pop().map(|one| (one.point_arrays, one.cell_arrays)).unwrap_or_default());
     }
     let of_points: Vec<_> = pieces.iter().map(|p| (Block::points(p.extent), p.point_arrays.as_slice())).collect();
-    let of_cells: Vec<_> =
-        pieces.iter().map(|p| (Block::cells(p.extent, whole), p.cell_arrays.as_slice())).collect();
+    let of_cells: Vec<_> = pieces.iter().map(|p| (Block::cells(p.extent, whole), p.cell_arrays.as_slice())).collect();
     let point_arrays = blocks("points", Block::points(whole), &of_points, &charge)?;
     Ok((point_arrays, blocks("cells", Block::cells(whole, whole), &of_cells, &charge)?))
 }

@@ -85,7 +85,9 @@ fn choose<'a>(header: &'a Header, name: Option<&str>) -> Result<&'a Variable, St
 
 /// The type of a variable's numbers, with `_Unsigned` heeded.
 fn stored_kind(variable: &Variable) -> Result<Kind, String> {
-    let kind = variable.kind.ok_or_else(|| format!("variable \"{}\" is text, or of a type of its own, not numbers", variable.name))?;
+    let kind = variable
+        .kind
+        .ok_or_else(|| format!("variable \"{}\" is text, or of a type of its own, not numbers", variable.name))?;
     let told = variable.text("_Unsigned").map(str::to_lowercase);
     Ok(match (told.as_deref(), kind) {
         (Some("true"), Kind::I8) => Kind::U8,
