@@ -122,12 +122,12 @@ impl Input {
             let known = "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or .series";
             return Err(self.wrong(format!("can't tell what it holds; {known}")));
         }
-        if series::is_list(&self.path) {
-            return self.read_list(wanted);
-        }
         let bytes = crate::input::read(&self.path).map_err(|source| self.unreadable(source))?;
         if bytes.is_empty() {
             return Err(self.wrong("is empty"));
+        }
+        if series::is_list(&self.path) {
+            return self.read_list(wanted);
         }
         let grid = match ending.as_str() {
             "stl" => stl::read(&bytes),
