@@ -20,6 +20,7 @@ use super::render::{self, RenderPlan};
 use super::scene::{MISSING, ScenePlan};
 use super::write::{self, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use crate::geometry::Dimension;
 use crate::io;
 use crate::occlusion::exact::{self, Budget};
 use crate::occlusion::{self, Deviations, Estimates, Estimator, ProgramDeviations, Sidecar};
@@ -497,6 +498,11 @@ impl Method {
         }
     }
 
+    /// Whether its values are those of rays, and nothing else.
+    pub fn is_by_rays(self) -> bool {
+        matches!(self, Method::Sobol | Method::Random | Method::Adaptive)
+    }
+
     /// Whether it is there for the thesis's figures alone.
     pub fn is_of_the_thesis(self) -> bool {
         matches!(self, Method::AsPublished | Method::AsProgrammed)
@@ -504,35 +510,50 @@ impl Method {
 }
 
 impl OcclusionPlan {
-    /// What computes the occlusion of voxels beside that of vertices, for `shading: auto`: a sixteenth of a vertex's rays,
-    /// from 4 to 16, by the same sampler. None where rays are no way to the same values: of a file nobody knows how it came
-    /// about, and the thesis's methods have values at vertices only.
-    pub fn at_voxels(&self) -> Option<Estimator> {
+    /// The rays that a voxel takes beside the vertices' values, for `shading: auto`: so few that what is left of their noise
+    /// among the neighbours is well below the tolerance, by the same sampler, and no more than a vertex takes. None where
+    /// rays are no way to the same values: of a file nobody knows how it came about, and the thesis's methods have values
+    /// at vertices only.
+    pub fn at_voxels(&self, dimension: Dimension, tolerance: f64) -> Option<Sampling> {
+        let most = self.most_at_voxels()?;
+        let noise = |samples: u32| Sampling { samples, ..most }.expected_variance(dimension, 0.5).sqrt();
+        let enough = |samples: &u32| noise(*samples) * dimension.pick(0.07, 0.1) <= 0.75 * tolerance;
+        let samples = (2..).map(|n| 1 << n).find(|n| *n >= most.samples || enough(n)).unwrap_or(most.samples);
+        Some(Sampling { samples: samples.min(most.samples), ..most })
+    }
+
+    /// The most rays that a voxel takes, for `shading: auto`: as many as a vertex.
+    pub fn most_at_voxels(&self) -> Option<Sampling> {
         let OcclusionSource::Compute(computation) = &self.source else { return None };
         let most = match computation.samples {
-            Samples::Fixed(samples) => samples,
+            Samples::Fixed(samples) => u32::try_from(samples).unwrap_or(u32::MAX),
             Samples::Target { .. } | Samples::Exact => 256,
         };
         let sampling = Sampling {
             sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
-            samples: (most / 16).clamp(4, 16) as u32,
+            samples: most,
             seed: computation.seed,
             max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
             target: None,
         };
-        (!computation.method.is_of_the_thesis()).then_some(Estimator::Sampled(sampling))
+        (!computation.method.is_of_the_thesis()).then_some(sampling)
     }
 
-    /// How many rays a voxel takes with this shading; none where it takes none, or as many as it needs.
-    pub fn rays_per_voxel(&self, shading: render::Shading) -> Option<u32> {
-        let estimator = match (shading, &self.source) {
-            (render::Shading::Auto, _) => self.at_voxels()?,
-            (render::Shading::Voxel, OcclusionSource::Compute(computation)) => computation.estimator(),
-            _ => return None,
-        };
-        match estimator {
-            Estimator::Sampled(sampling) if sampling.target.is_none() => Some(sampling.samples),
+    /// The rays that each voxel takes, if that is a fixed number of rays, for `shading: voxel`.
+    pub fn instead_of_vertices(&self) -> Option<Sampling> {
+        let OcclusionSource::Compute(computation) = &self.source else { return None };
+        match computation.estimator() {
+            Estimator::Sampled(sampling) if sampling.target.is_none() => Some(sampling),
             _ => None,
+        }
+    }
+
+    /// Where visible points have their occlusion from, unless it is said: from vertices and rays, or from vertices alone
+    /// if their values are not made by rays.
+    pub fn default_shading(&self) -> render::Shading {
+        match &self.source {
+            OcclusionSource::Compute(computation) if computation.method.is_by_rays() => render::Shading::Auto,
+            _ => render::Shading::Smooth,
         }
     }
 }

@@ -93,6 +93,7 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Pa
         "dimensions": render.dimensions,
         "shading": render.shading,
         "denoise": render.denoise,
+        "tolerance": render.tolerance,
         "supersample": render.supersample,
         "dilate": render.dilate,
     });
