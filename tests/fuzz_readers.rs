@@ -92,15 +92,15 @@ fn pvti() -> String {
 
 fn pvtu() -> String {
     "<VTKFile type='PUnstructuredGrid'><PUnstructuredGrid GhostLevel='0'><Piece Source='part.vtu'/>\
-     <Piece Source='part.vtu'/></PUnstructuredGrid></VTKFile>"
+     <Piece Source='beyond.vtu'/></PUnstructuredGrid></VTKFile>"
         .into()
 }
 
 /// Lists of two files over time.
-fn collection(file: &str) -> String {
+fn collection(first: &str, second: &str) -> String {
     format!(
-        "<VTKFile type='Collection'><Collection><DataSet timestep='0' part='0' file='{file}'/>\
-         <DataSet timestep='1' part='1' file='{file}'/></Collection></VTKFile>"
+        "<VTKFile type='Collection'><Collection><DataSet timestep='0' part='0' file='{first}'/>\
+         <DataSet timestep='1' part='1' file='{second}'/></Collection></VTKFile>"
     )
 }
 
@@ -210,6 +210,8 @@ fn damaged_files_are_read_or_refused() {
     // What lists name, and isn't damaged itself.
     std::fs::write(folder.path().join("part.vti"), vti()).unwrap();
     std::fs::write(folder.path().join("part.vtu"), VTU).unwrap();
+    let beyond = VTU.replace("0 0 0 1 0 0 0 1 0 0 0 1<", "10 0 0 11 0 0 10 1 0 10 0 1<");
+    std::fs::write(folder.path().join("beyond.vtu"), beyond).unwrap();
     let netcdf4 = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/netcdf4.nc");
     let files: Vec<(&str, Vec<u8>, Value)> = vec![
         ("x.raw", values(), image("x.raw", raw)),
@@ -238,9 +240,13 @@ fn damaged_files_are_read_or_refused() {
             pvti().into_bytes(),
             json!({"isosurface": {"field": {"image": {"files": ["x.pvti", "x.pvti"]}}, "isovalue": 100}}),
         ),
-        ("x.pvd", collection("part.vti").into_bytes(), image("x.pvd", json!({}))),
+        ("x.pvd", collection("part.vti", "part.vti").into_bytes(), image("x.pvd", json!({}))),
         ("x.vti.series", series().into_bytes(), image("x.vti.series", json!({}))),
-        ("part.pvd", collection("part.vtu").replace("'1'", "'0'").into_bytes(), extruded("part.pvd")),
+        (
+            "part.pvd",
+            collection("part.vtu", "beyond.vtu").replace("timestep='1'", "timestep='0'").into_bytes(),
+            extruded("part.pvd"),
+        ),
         ("x.pvtu", pvtu().into_bytes(), extruded("x.pvtu")),
         ("x4.nc", std::fs::read(netcdf4).unwrap(), image("x4.nc", json!({"array": "density"}))),
         ("x.stl", binary_stl(), extruded("x.stl")),

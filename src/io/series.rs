@@ -61,17 +61,6 @@ pub fn files(path: &Path) -> Vec<PathBuf> {
     read(path).unwrap_or_default().into_iter().flat_map(|step| step.files).collect()
 }
 
-/// Whether its files are images, by the name of the first; a `.vtk` can be either, and is looked into.
-pub fn is_of_images(path: &Path) -> bool {
-    let Some(first) = files(path).into_iter().next() else { return false };
-    match first.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
-        "vtk" => {
-            matches!(super::vtk::read_wanted(&first, super::vtk::Wanted::Named(&[])), Ok(super::vtk::DataSet::Image(_)))
-        }
-        ending => !super::mesh::ENDINGS.contains(&ending),
-    }
-}
-
 type Listed = Vec<(Option<f64>, String)>;
 
 fn time_of(number: f64, file: &str) -> Result<Option<f64>, String> {

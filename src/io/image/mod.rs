@@ -27,7 +27,6 @@ use serde::{Deserialize, Serialize};
 pub use self::axes::{Axis, Frame, Image, Opened, Placement, Positions, Role};
 pub use self::numbers::Numbers;
 use self::numbers::Packing;
-use super::vtk::piece_files;
 use super::{Input, InputError as Error, series};
 use crate::volume::{Kind, available_memory};
 
@@ -119,7 +118,7 @@ pub fn data_files(path: &Path) -> Vec<PathBuf> {
     match format(path) {
         Some(Format::Nrrd) => nrrd::data_files(path),
         Some(Format::Nifti) => nifti::data_files(path),
-        Some(Format::Pieces) => piece_files(path),
+        Some(Format::Pieces) => super::vtk::piece_files(path),
         Some(Format::List) => listed_files(path),
         _ => Vec::new(),
     }
@@ -131,12 +130,23 @@ fn listed_files(path: &Path) -> Vec<PathBuf> {
     files.flat_map(|file| [data_files(&file), vec![file]].concat()).collect()
 }
 
+/// Whether the files of a list are images, by the name of the first; a `.vtk` can be either, and is looked into.
+fn list_is_of_images(path: &Path) -> bool {
+    let Some(first) = series::files(path).into_iter().next() else { return false };
+    match first.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
+        "vtk" => {
+            matches!(super::vtk::read_wanted(&first, super::vtk::Wanted::Named(&[])), Ok(super::vtk::DataSet::Image(_)))
+        }
+        ending => !super::mesh::ENDINGS.contains(&ending),
+    }
+}
+
 /// Whether `info` tells of a file as an image of measurements, with time among its axes. Images of VTK and files without a header,
 /// which hold whatever this program writes, are told of otherwise.
 pub fn is_measurement(path: &Path) -> bool {
     match format(path) {
         None | Some(Format::Vti | Format::Pieces | Format::Raw) => false,
-        Some(Format::List) => series::is_of_images(path),
+        Some(Format::List) => list_is_of_images(path),
         Some(Format::Nifti | Format::Tiff | Format::Netcdf | Format::Nrrd) => true,
     }
 }

@@ -180,7 +180,7 @@ pub(super) fn parse_at(bytes: &[u8], wanted: Wanted<'_>, path: Option<&Path>) ->
 
 /// Meshes as one, where they have the same arrays.
 pub(super) fn joined(parts: Vec<UnstructuredGrid>) -> Result<UnstructuredGrid, Problem> {
-    pieces::mesh(parts)
+    mesh::joined(parts)
 }
 
 /// Refuses XML whose shape would keep a parser busy for ever.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::data_array::field_data;
 use super::document::{Document, numbers, required};
-use super::pieces::{self, Piece};
+use super::pieces::Piece;
 use super::{DataSet, Problem, image, mesh, with_document};
 
 /// The data set of a list.
@@ -47,7 +47,7 @@ pub(super) fn read(document: &Document<'_>, path: &Path) -> Result<DataSet, Prob
     Ok(match head {
         Some(head) => DataSet::Image(head.image(document, blocks, own)?),
         None => {
-            let mut whole = pieces::mesh(meshes)?;
+            let mut whole = mesh::joined(meshes)?;
             if !own.is_empty() {
                 whole.field_data = own;
             }

@@ -1,9 +1,9 @@
 //! Data sets that are stored in pieces, joined to one: the parts that parallel programs write.
 //!
-//! The pieces of an image may overlap, as those with ghost layers do, but none of its points may be missing. The pieces of a
-//! mesh follow each other; points on their seams stay two. Arrays are joined where all pieces have them alike.
+//! The pieces of an image may overlap, as those with ghost layers do, but none of its points may be missing. Arrays are
+//! joined where all pieces have them alike. Those of a mesh are joined where meshes are read.
 
-use super::{Problem, UnstructuredGrid};
+use super::Problem;
 use crate::volume::Array;
 
 /// A part of an image.
@@ -121,7 +121,7 @@ fn blocks(
 }
 
 /// Whether two pieces have the same arrays, in the same order.
-fn alike(first: &[Array], other: &[Array]) -> Result<(), Problem> {
+pub(super) fn alike(first: &[Array], other: &[Array]) -> Result<(), Problem> {
     let shape = |array: &Array| (array.name.clone(), array.components, array.values.kind());
     let (a, b): (Vec<_>, Vec<_>) = (first.iter().map(shape).collect(), other.iter().map(shape).collect());
     if a == b {
@@ -130,56 +130,6 @@ fn alike(first: &[Array], other: &[Array]) -> Result<(), Problem> {
     let odd = a.iter().find(|x| !b.contains(x)).or_else(|| b.iter().find(|x| !a.contains(x))).or(a.first());
     let name = odd.map_or("", |(name, ..)| name);
     Err(Problem::Pieces { problem: format!("differ: array `{name}` isn't alike in all of them") })
-}
-
-/// One mesh of several.
-pub(super) fn mesh(pieces: Vec<UnstructuredGrid>) -> Result<UnstructuredGrid, Problem> {
-    let mut pieces: Vec<_> = pieces.into_iter().filter(|p| !p.points.is_empty() || !p.types.is_empty()).collect();
-    if pieces.len() < 2 {
-        return Ok(pieces.pop().unwrap_or_default());
-    }
-    let points: usize = pieces.iter().map(|piece| piece.points.len()).sum();
-    if u32::try_from(points).is_err() {
-        return Err(Problem::Pieces { problem: format!("have {points} points together, more than can be numbered") });
-    }
-    let first = &pieces[0];
-    for piece in &pieces {
-        alike(&first.point_arrays, &piece.point_arrays)?;
-        alike(&first.cell_arrays, &piece.cell_arrays)?;
-    }
-    let mut whole = UnstructuredGrid {
-        point_arrays: concatenated(&pieces, |piece| &piece.point_arrays),
-        cell_arrays: concatenated(&pieces, |piece| &piece.cell_arrays),
-        field_data: first.field_data.clone(),
-        ..Default::default()
-    };
-    for piece in pieces {
-        let (shift, base) = (whole.points.len() as u32, whole.connectivity.len());
-        whole.points.extend(piece.points);
-        whole.connectivity.extend(piece.connectivity.iter().map(|&p| p.saturating_add(shift)));
-        whole.offsets.extend(piece.offsets.iter().map(|&end| end.saturating_add(base)));
-        whole.types.extend(piece.types);
-    }
-    Ok(whole)
-}
-
-/// Arrays of pieces that are known to be alike, one behind the other.
-fn concatenated(pieces: &[UnstructuredGrid], arrays: impl Fn(&UnstructuredGrid) -> &Vec<Array>) -> Vec<Array> {
-    let first = pieces.first().map(&arrays);
-    let mut joined = Vec::new();
-    for (k, array) in first.into_iter().flatten().enumerate() {
-        let total = pieces.iter().map(|piece| arrays(piece)[k].values.len()).sum();
-        let mut values = array.values.kind().zeros(total);
-        let mut at = 0;
-        for piece in pieces {
-            let from = &arrays(piece)[k].values;
-            let placed = values.place(at, from, 0, from.len());
-            debug_assert!(placed, "pieces are alike, and there is room for all of them");
-            at += from.len();
-        }
-        joined.push(Array { values, ..array.clone_head() });
-    }
-    joined
 }
 
 #[cfg(test)]
