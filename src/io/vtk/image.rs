@@ -131,7 +131,7 @@ pub(super) fn pieces(document: &Document<'_>, whole: [i64; 6]) -> Result<Vec<Pie
         let (mut points, mut cells) = (1u64, 1u64);
         for a in 0..3 {
             let count = extent[2 * a + 1].checked_sub(extent[2 * a]).and_then(|n| u64::try_from(n).ok());
-            let more = |product: u64, n: u64| product.checked_mul(n).filter(|&n| n < 1 << 48);
+            let more = |product: u64, n: u64| product.checked_mul(n).filter(|&n| n < 1 << 62);
             // An axis with a single point has no thickness, and VTK counts it as one cell.
             let counts = count.and_then(|n| Some((more(points, n.checked_add(1)?)?, more(cells, n.max(1))?)));
             (points, cells) = counts.ok_or_else(|| Problem::Attribute {
