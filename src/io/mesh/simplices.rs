@@ -216,6 +216,21 @@ mod tests {
     }
 
     #[test]
+    fn cells_of_a_neighbouring_piece_do_not_count() {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]];
+        let mut grid = UnstructuredGrid { points: points.to_vec(), ..Default::default() };
+        [[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 2, 4]].iter().for_each(|cell| grid.push(TETRAHEDRON, cell));
+        let kept = |name: &str, marks: [u8; 3]| {
+            let marked = UnstructuredGrid { cell_arrays: vec![Array::new(name, 1, marks.to_vec())], ..grid.clone() };
+            let Cells::Tetrahedra(tetrahedra) = simplices(&marked).unwrap().cells else { panic!("no solid") };
+            tetrahedra.len()
+        };
+        // Copies and hidden cells; 2 marks a cell that others refine, in grids that can't be read here.
+        assert_eq!((kept("vtkGhostType", [0, 1, 32]), kept("vtkGhostType", [0, 2, 33])), (1, 2));
+        assert_eq!((kept("vtkGhostLevels", [0, 1, 2]), kept("levels", [0, 1, 2])), (1, 3));
+    }
+
+    #[test]
     fn a_hexahedron_that_serves_as_a_wedge() {
         let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
         let (points, tetrahedra) = read(&points, &[(HEXAHEDRON, &[0, 1, 2, 2, 3, 4, 5, 5])]);
