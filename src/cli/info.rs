@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use ao4d::inspect;
+use ao4d::pipeline::Told;
 use clap::Args;
 
 use super::console::Console;
@@ -19,6 +20,9 @@ pub struct Info {
     /// Also write an image's values there, as little-endian float64, x fastest, then y, z, time
     #[arg(long, value_name = "FILE")]
     values: Option<PathBuf>,
+    /// Print the pipeline that made the file, as YAML that makes it again
+    #[arg(long, conflicts_with_all = ["array", "values", "json"])]
+    pipeline: bool,
     /// Print it as JSON
     #[arg(long)]
     json: bool,
@@ -27,6 +31,12 @@ pub struct Info {
 impl Info {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         super::existing(&self.file)?;
+        if self.pipeline {
+            let told = Told::read(&self.file)?;
+            told.notes.iter().for_each(|note| console.note(&format!("warning: {}: {note}", self.file.display())));
+            console.result(&told.text)?;
+            return Ok(Outcome::Done);
+        }
         let array = self.array.as_deref();
         let info = inspect::Info::read_array(&self.file, array)?;
         if let Some(values) = &self.values {

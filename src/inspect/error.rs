@@ -53,6 +53,14 @@ pub enum Error {
         /// Why they are so many.
         why: &'static str,
     },
+    /// A file that tells of no pipeline.
+    #[error("{}: tells of no pipeline: {message}", path.display())]
+    Pipeline {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        message: String,
+    },
     /// Two files that have nothing in common.
     #[error("{} is {first} and {} is {second}; give two of a kind", a.display(), b.display())]
     Kinds {

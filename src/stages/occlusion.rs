@@ -76,7 +76,7 @@ pub enum Method {
     Adaptive,
     /// In closed form, without sampling noise.
     Exact,
-    /// As the thesis published it, slips and all, for its figures.
+    /// As the thesis published it, with its deviations from the definition, for its figures.
     AsPublished,
     /// As the thesis's program did it, which is not what its text says, for its figures.
     AsProgrammed,
@@ -189,7 +189,8 @@ impl Stage for OcclusionPlan {
     }
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
-        let used = plan.all::<RenderPlan>().any(|(_, render)| render.occlusion == Some(me));
+        let shown = plan.all::<RenderPlan>().any(|(_, render)| render.occlusion == Some(me));
+        let used = shown || (0..plan.stages.len()).any(|stage| plan.wants_values(stage, me.index()));
         (!used && plan[me].file.is_none()).then_some("no render uses this occlusion and no `file` keeps it")
     }
 
@@ -219,7 +220,26 @@ impl Stage for OcclusionPlan {
     fn outputs(me: Ref<Self>, plan: &Plan, keys: &Keys) -> Vec<Output> {
         let Some(file) = &plan[me].file else { return Vec::new() };
         let beside = std::iter::once(sidecar_path(file)).chain(plan[me].errors_file()).collect();
-        vec![Output { file: file.clone(), beside, key: keys.of(me.index()).to_owned() }]
+        let (key, tells) = (keys.of(me.index()).to_owned(), Some(sidecar_path(file)));
+        vec![Output { file: file.clone(), beside, key, tells }]
+    }
+
+    fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
+        let path = plan.out.join(sidecar_path(output));
+        let failed = |cause| io::Error::File { path: path.clone(), action: "be read", cause };
+        let known = crate::input::read_text(&path).map_err(failed)?;
+        let sidecar = Sidecar::from_yaml(&known).map_err(|e| failed(std::io::Error::other(e.to_string())))?;
+        write_whole(&path, Sidecar { pipeline: Some(text.to_owned()), ..sidecar }.to_yaml().as_bytes())
+    }
+
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let OcclusionSource::Compute(computation) = &plan[me].source else { return Value::Null };
+        let method = computation.method;
+        match computation.samples {
+            Samples::Exact => json!({ "method": method, "max_cones": computation.max_cones }),
+            Samples::Fixed(samples) => json!({ "method": method, "samples": samples }),
+            Samples::Target { max_samples, .. } => json!({ "method": method, "max_samples": max_samples }),
+        }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String {
@@ -266,6 +286,7 @@ impl Stage for OcclusionPlan {
             (OcclusionSource::Load(_), Some(loaded)) => loaded.sidecar.clone(),
             (OcclusionSource::Load(_), None) => return Ok(String::new()),
         };
+        let sidecar = Sidecar { pipeline: Some(run.told.to_owned()), ..sidecar };
         // The values last: they are what others look for.
         match plan[me].errors_file() {
             Some(errors) => {
@@ -383,7 +404,9 @@ fn mask<const D: usize>(
     let shown = plan.all::<WritePlan>().any(|(_, write)| {
         plan[write.render].occlusion == Some(me) && !write.stale(write::Content::Mesh, &|f| run.is_stale(f)).is_empty()
     });
-    if shown || plan[me].file.is_some() {
+    let stale = |stage: usize| plan.files_of(stage).into_iter().any(|file| run.is_stale(file));
+    let whole = (0..plan.stages.len()).any(|stage| plan.wants_values(stage, me.index()) && stale(stage));
+    if shown || whole || plan[me].file.is_some() {
         return Ok(None);
     }
     let mut left = computation.most_rays().saturating_mul(scene.session.mesh().vertices.len() as u64) / 4;
@@ -509,6 +532,11 @@ impl Method {
     }
 }
 
+/// Rays that a voxel is looked at again with, to measure pictures,
+const AUDIT_RAYS: u32 = 256;
+/// none of which are a picture's own.
+const AUDIT_SEED: u64 = 0x5851_f42d_4c95_7f2d;
+
 impl OcclusionPlan {
     /// The rays that a voxel takes beside the vertices' values, for `shading: auto`: so few that what is left of their noise
     /// among the neighbours is well below the tolerance, by the same sampler, and no more than a vertex takes. None where
@@ -537,6 +565,14 @@ impl OcclusionPlan {
             target: None,
         };
         (!computation.method.is_of_the_thesis()).then_some(sampling)
+    }
+
+    /// Rays to measure pictures by: what this occlusion is meant to be, whatever its method. None for a file nobody knows
+    /// how it came about.
+    pub fn audit(&self) -> Option<Sampling> {
+        let OcclusionSource::Compute(computation) = &self.source else { return None };
+        let max_distance = computation.max_distance.map_or(f32::INFINITY, |d| d as f32);
+        Some(Sampling { max_distance, ..Sampling::new(AUDIT_RAYS, computation.seed ^ AUDIT_SEED) })
     }
 
     /// The rays that each voxel takes, if that is a fixed number of rays, for `shading: voxel`.
@@ -615,5 +651,6 @@ fn sidecar(found: &Estimates, computation: &Computation, mesh_hash: &str) -> Sid
         error_estimate: found.error(),
         mesh: mesh_hash.to_owned(),
         program: PROGRAM.to_owned(),
+        pipeline: None,
     }
 }

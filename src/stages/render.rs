@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
@@ -22,7 +23,7 @@ use crate::occlusion::Estimator;
 use crate::render::filters::denoise::Refine;
 use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
+use crate::render::{self, Accuracy, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
 use crate::text::number;
 use crate::trace::Sampling;
 
@@ -137,7 +138,8 @@ impl Stage for RenderPlan {
     }
 
     fn resolve(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let (scene, occlusion) = scene_and_occlusion(resolver, path, spec)?;
+        let (input, named) = (spec.input.as_deref(), spec.occlusion.as_deref());
+        let (scene, occlusion) = scene_and_occlusion(resolver, path, input, named)?;
         let dimension = resolver.plan[scene].dimension;
         let blank = CameraSpec::default();
         let camera_spec = spec.camera.as_ref().unwrap_or(&blank);
@@ -222,6 +224,22 @@ impl Stage for RenderPlan {
         Some(plan[me].scene)
     }
 
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let render = &plan[me];
+        let mut written = json!({
+            "camera": render.camera.written(),
+            "shading": render.shading,
+            "supersample": render.supersample,
+            "dilate": render.dilate,
+        });
+        // Elsewhere it has no effect, and would be warned of.
+        if rays_of(plan, render).is_some() {
+            written["denoise"] = render.denoise.into();
+            written["tolerance"] = render.tolerance.into();
+        }
+        written
+    }
+
     /// The memory of a slab of one layer: what is seen, its shade, and the arrays of the files that have to be made.
     fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
         let render = &plan[me];
@@ -285,18 +303,22 @@ impl Stage for RenderPlan {
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
         picture.filters = filters(plan, render, &picture);
+        picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
-        let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &picture.grid, hash)?;
+        let mut files = PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), &picture.grid, hash)?;
         let aovs = files.aovs().to_vec();
         let mut seen = 0;
         // Two passes over the voxels: what is seen, and its shade.
         let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
-        picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
+        let accuracy = picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;
             Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
         })?;
         running.end();
+        if let Some(accuracy) = &accuracy {
+            files.tell(accuracy);
+        }
         let rendering = start.elapsed();
         let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
         let notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
@@ -304,8 +326,11 @@ impl Stage for RenderPlan {
             run.made(&file, bytes, notes.clone())?;
         }
         let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
+        let off = accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
+            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
+        });
         Ok(format!(
-            "{} of {} voxels see something, {rate:.2} million voxels a second",
+            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
             grouped(seen),
             grouped(render.voxels())
         ))
@@ -418,6 +443,11 @@ fn filters<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<
     filters
 }
 
+/// An error to two digits, as far as there are four places.
+fn short(error: f64) -> String {
+    if error < 5e-5 { "less than 0.0001".to_owned() } else { format!("{error:.4}") }
+}
+
 /// Why a picture shows nothing.
 fn nothing_seen<const D: usize>(picture: &Renderer<D>, id: &str) -> String {
     let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
@@ -443,18 +473,19 @@ impl Shading {
 
 /// What a render shows, and what darkens it. Named keys decide; what they leave open is the nearest earlier one; and
 /// an occlusion of another scene is refused.
-fn scene_and_occlusion(
+pub(super) fn scene_and_occlusion(
     resolver: &Resolver,
     path: &str,
-    spec: &RenderSpec,
+    input: Option<&str>,
+    occlusion: Option<&str>,
 ) -> Result<(Ref<ScenePlan>, Option<Ref<OcclusionPlan>>), Invalid> {
     let plan = &resolver.plan;
     let (mut of_scene, mut of_occlusion) = (None, None);
-    if let Some(name) = &spec.input {
+    if let Some(name) = input {
         let input = resolver.lookup(&format!("{path}.input"), name, &[ScenePlan::KIND, OcclusionPlan::KIND])?;
         (of_scene, of_occlusion) = (plan.reference::<ScenePlan>(input), plan.reference::<OcclusionPlan>(input));
     }
-    let named: Option<Ref<OcclusionPlan>> = match spec.occlusion.as_deref() {
+    let named: Option<Ref<OcclusionPlan>> = match occlusion {
         None | Some("none") => None,
         Some(name) => plan.reference(resolver.lookup(&format!("{path}.occlusion"), name, &[OcclusionPlan::KIND])?),
     };
@@ -476,7 +507,7 @@ fn scene_and_occlusion(
         }
         return Ok((scene, named));
     }
-    if spec.occlusion.is_some() {
+    if occlusion.is_some() {
         return Ok((scene, None));
     }
     if of_occlusion.is_some() {

@@ -22,14 +22,22 @@ const LEAST: f64 = 0.1;
 impl Sampling {
     /// The variance to be expected of a value by its rays, at a place whose true value is this.
     pub fn expected_variance(&self, dimension: Dimension, value: f64) -> f64 {
-        let (p, rays) = (value.clamp(0.0, 1.0), f64::from(self.samples.max(1)));
-        let spread = 4.0 * p * (1.0 - p);
-        let variance = match (self.sampler, dimension) {
-            (Sampler::Random, _) => 0.25 * spread / rays,
-            (Sampler::Sobol, Dimension::Three) => 0.65 * 0.25 * spread.sqrt() / (rays * rays.sqrt()),
-            (Sampler::Sobol, Dimension::Four) => 0.8 * 0.25 * libm::cbrt(spread * spread) / (rays * libm::cbrt(rays)),
+        let rays = f64::from(self.samples.max(1));
+        let variance = match self.sampler {
+            Sampler::Random => value.clamp(0.0, 1.0) * (1.0 - value.clamp(0.0, 1.0)) / rays,
+            Sampler::Sobol => of_even_rays(dimension, value, rays),
         };
         variance.max((LEAST / rays).powi(2))
+    }
+}
+
+/// The variance of so many even rays where the value is this.
+pub(super) fn of_even_rays(dimension: Dimension, value: f64, rays: f64) -> f64 {
+    let p = value.clamp(0.0, 1.0);
+    let spread = 4.0 * p * (1.0 - p);
+    match dimension {
+        Dimension::Three => 0.65 * 0.25 * spread.sqrt() / (rays * rays.sqrt()),
+        Dimension::Four => 0.8 * 0.25 * libm::cbrt(spread * spread) / (rays * libm::cbrt(rays)),
     }
 }
 

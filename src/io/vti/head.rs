@@ -7,6 +7,7 @@
 
 use std::fmt::Write;
 
+use super::super::vtk::text::text_array;
 use super::super::xml::escape;
 use super::{ArraySpec, Compression, Settings};
 use crate::volume::Grid;
@@ -15,6 +16,9 @@ use crate::volume::Grid;
 const TAG_PLACE: usize = 4079;
 /// The size of those chunks.
 const CHUNK: usize = 4096;
+
+/// What the appended bytes begin with.
+pub(super) const TAG: &str = "<AppendedData encoding=\"raw\">";
 
 /// What closes the head behind the arrays.
 pub(super) const BEHIND_ARRAYS: &str = "      </PointData>\n      <CellData/>\n    </Piece>\n  </ImageData>\n";
@@ -27,10 +31,16 @@ pub(super) fn appended<'a>(before: String, arrays: impl Iterator<Item = (&'a Arr
         let _ = writeln!(head, "        <DataArray {attributes} format=\"appended\" offset=\"{offset}\"/>");
     }
     head.push_str(BEHIND_ARRAYS);
+    pad(&mut head);
+    head.push_str(TAG);
+    head.push_str("\n_");
+    head
+}
+
+/// Adds spaces such that the tag behind them stands where every ParaView reads it.
+pub(super) fn pad(head: &mut String) {
     let padding = (TAG_PLACE + CHUNK - head.len() % CHUNK) % CHUNK;
     head.extend(std::iter::repeat_n(' ', padding));
-    head.push_str("<AppendedData encoding=\"raw\">\n_");
-    head
 }
 
 /// The head in front of the arrays; `scalars` is the array that ParaView shows first.
@@ -50,23 +60,32 @@ pub(super) fn before_arrays(grid: &Grid, settings: &Settings, scalars: Option<&A
   <ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{origin}" Spacing="{spacing}" Direction="1 0 0 0 1 0 0 0 1">
 "#
     );
-    if settings.time.is_some() || !settings.field_data.is_empty() {
+    if settings.time.is_some() || !settings.field_data.is_empty() || !settings.numbers.is_empty() {
         head.push_str("    <FieldData>\n");
         if let Some(time) = settings.time {
             let open = r#"<DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">"#;
             let _ = writeln!(head, "      {open}{time:?}</DataArray>");
         }
+        for (name, number) in &settings.numbers {
+            let (name, number) = (escape(name), fixed_width(*number));
+            let open = format!(r#"<DataArray type="Float64" Name="{name}" NumberOfTuples="1" format="ascii">"#);
+            let _ = writeln!(head, "      {open}{number}</DataArray>");
+        }
         for (name, text) in &settings.field_data {
-            // VTK writes a string as the numbers of its bytes, and a zero.
-            let codes: String = text.bytes().map(|b| format!("{b} ")).collect();
-            let attributes = format!("Name=\"{}\" NumberOfTuples=\"1\" format=\"ascii\"", escape(name));
-            let _ = writeln!(head, "      <Array type=\"String\" {attributes}>{codes}0</Array>");
+            head.push_str("      ");
+            head.push_str(&text_array(name, text));
+            head.push('\n');
         }
         head.push_str("    </FieldData>\n");
     }
     let scalars = scalars.map_or(String::new(), |a| format!(" Scalars=\"{}\"", escape(&a.name)));
     let _ = write!(head, "    <Piece Extent=\"0 {x} 0 {y} 0 {z}\">\n      <PointData{scalars}>\n");
     head
+}
+
+/// A number as text that is as long for every number, so that it can be written over.
+fn fixed_width(number: f64) -> String {
+    format!("{number:>24?}")
 }
 
 /// What every `<DataArray>` says, wherever its bytes are.

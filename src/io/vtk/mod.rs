@@ -27,6 +27,7 @@ mod mesh;
 mod nesting;
 mod parallel;
 mod pieces;
+pub(in crate::io) mod text;
 
 use std::path::{Path, PathBuf};
 

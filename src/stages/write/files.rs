@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Content, Opening, VoxelFile, WritePlan};
 use crate::io::Error;
-use crate::render::Aov;
+use crate::render::{Accuracy, Aov};
 use crate::stages::render::RenderPlan;
 use crate::stages::{Plan, Ref};
 use crate::volume::{Array, Grid};
@@ -27,6 +27,7 @@ impl PictureFiles {
     pub fn create(
         render: Ref<RenderPlan>,
         plan: &Plan,
+        told: &str,
         stale: &dyn Fn(&Path) -> bool,
         grid: &Grid,
         mesh_hash: &str,
@@ -42,7 +43,7 @@ impl PictureFiles {
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == render) {
             for file in write.stale(Content::Voxels, stale) {
                 let path = plan.out.join(&file.path);
-                let opened = file.format.open(Opening { path: &path, plan, write, grid, mesh_hash })?;
+                let opened = file.format.open(Opening { path: &path, plan, write, grid, mesh_hash, told })?;
                 let places = file.format.arrays(write).into_iter().map(&mut place).collect();
                 files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
             }
@@ -62,6 +63,11 @@ impl PictureFiles {
             file.add_slab(first, &arrays)?;
         }
         Ok(())
+    }
+
+    /// Takes note of how far off the picture's occlusion is.
+    pub fn tell(&mut self, accuracy: &Accuracy) {
+        self.files.iter_mut().for_each(|open| open.file.tell(accuracy));
     }
 
     /// Completes the files and gives them their names; returns each with its length.

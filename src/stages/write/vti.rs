@@ -4,11 +4,13 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::{Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, VoxelFile, WritePlan};
+use super::{
+    Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, Retell, VoxelFile, WritePlan, copy_over,
+};
 use crate::geometry::Dimension;
 use crate::io::vti::{self, ArraySpec, VtiWriter};
-use crate::io::{AtomicFile, Error};
-use crate::render::Aov;
+use crate::io::{AtomicFile, Error, PIPELINE};
+use crate::render::{Accuracy, Aov};
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
 use crate::stages::render::array_bytes;
@@ -41,10 +43,16 @@ impl OutputFormat for Vti {
         }
     }
 
-    fn open(Opening { path, plan, write, grid, mesh_hash }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+    const RETELL: Option<Retell> = Some(|path, write, text| {
+        copy_over(path, |source, out| vti::retell(source, out, encoding(write), (PIPELINE, text)))
+    });
+
+    fn open(
+        Opening { path, plan, write, grid, mesh_hash, told }: Opening,
+    ) -> Result<Option<Box<dyn VoxelFile>>, Error> {
         let dimension = plan[plan[write.render].scene].dimension;
         let specs: Vec<ArraySpec> = write.arrays.iter().map(|&channel| array_spec(channel, dimension)).collect();
-        let settings = settings(plan, write, mesh_hash, path.parent());
+        let settings = settings(plan, write, mesh_hash, told, path.parent());
         let out = AtomicFile::create(path)?;
         let writer = VtiWriter::new(out, grid, &specs, &settings).map_err(AtomicFile::name_in(path))?;
         Ok(Some(Box::new(File { path: path.to_owned(), writer })))
@@ -64,6 +72,12 @@ impl VoxelFile for File {
         written.map_err(AtomicFile::name_in(&self.path))
     }
 
+    fn tell(&mut self, accuracy: &Accuracy) {
+        for (name, number) in numbers(accuracy) {
+            self.writer.set_number(name, number);
+        }
+    }
+
     fn finish(self: Box<Self>) -> Result<u64, Error> {
         self.writer.finish().map_err(AtomicFile::name_in(&self.path))?.commit()
     }
@@ -77,8 +91,22 @@ fn array_spec(aov: Aov, dimension: Dimension) -> ArraySpec {
     ArraySpec::new(aov.name(), aov.kind(), components)
 }
 
+/// How far off the occlusion is, as files say it: the root mean square, the most that some voxel was off, and how many
+/// voxels were looked at.
+fn numbers(accuracy: &Accuracy) -> [(&'static str, f64); 3] {
+    let Accuracy { rms, largest, voxels } = *accuracy;
+    [("occlusion_rms_error", rms), ("occlusion_largest_error", largest), ("occlusion_voxels_checked", voxels as f64)]
+}
+
+fn encoding(write: &WritePlan) -> vti::Encoding {
+    match write.encoding {
+        Encoding::Appended => vti::Encoding::Appended,
+        Encoding::Inline => vti::Encoding::Inline,
+    }
+}
+
 /// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
-fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Path>) -> vti::Settings {
+fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, told: &str, scratch: Option<&Path>) -> vti::Settings {
     let render = &plan[write.render];
     let scene = &plan[render.scene];
     let occlusion = render.occlusion.map(|o| match &plan[o].source {
@@ -98,10 +126,7 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Pa
         "dilate": render.dilate,
     });
     vti::Settings {
-        encoding: match write.encoding {
-            Encoding::Appended => vti::Encoding::Appended,
-            Encoding::Inline => vti::Encoding::Inline,
-        },
+        encoding: encoding(write),
         compression: match write.compression {
             Compression::None => vti::Compression::None,
             Compression::Zlib => vti::Compression::Zlib,
@@ -109,9 +134,14 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Pa
         },
         field_data: vec![
             ("program".to_owned(), PROGRAM.to_owned()),
-            ("pipeline".to_owned(), plan.name.clone()),
+            (PIPELINE.to_owned(), told.to_owned()),
             ("settings".to_owned(), settings.to_string()),
         ],
+        // Known when the picture is there; 0 of 0 voxels if it shows nothing.
+        numbers: match render.occlusion.and_then(|occlusion| plan[occlusion].audit()) {
+            Some(_) => numbers(&Accuracy::default()).map(|(name, number)| (name.to_owned(), number)).into(),
+            None => Vec::new(),
+        },
         scratch: scratch.map(Path::to_owned),
         ..vti::Settings::default()
     }
