@@ -5,7 +5,8 @@
 //!
 //! | file | read as |
 //! | --- | --- |
-//! | `.vti`, `.vtu`, `.vtp`, `.vtk` | an image or a mesh, as [`crate::io::vtk`] reads it |
+//! | `.vti`, `.vtu`, `.vtp`, `.vtk`, `.pvti`, `.pvtu`, `.pvtp` | an image or a mesh, as [`crate::io::vtk`] reads it |
+//! | `.pvd`, `.vti.series` | images over time, described but not compared, or one mesh |
 //! | `.stl`, `.obj`, `.ply`, `.msh` | a mesh, with the cells that the file has |
 //! | `.nii`, `.nrrd`, `.nc`, `.tif` | an image, described but not compared ([`image`]) |
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
@@ -63,8 +64,8 @@ impl Contents {
         match ending.as_str() {
             "f32" => occlusion_file(path),
             "raw" => numbers(path, 12, "colours are three floats of four bytes each").map(Self::Raw),
-            "stl" | "ply" | "obj" | "msh" => mesh(path).map(Self::Mesh),
-            "vti" | "vtu" | "vtp" | "vtk" | "xml" => Ok(match vtk::read(path)? {
+            "stl" | "ply" | "obj" | "msh" | "pvd" | "series" => mesh(path).map(Self::Mesh),
+            "vti" | "vtu" | "vtp" | "pvti" | "pvtu" | "pvtp" | "vtk" | "xml" => Ok(match vtk::read(path)? {
                 DataSet::Image(image) => Self::Image(image),
                 DataSet::Unstructured(mesh) => Self::Mesh(mesh),
             }),

@@ -4,7 +4,8 @@
 //! | --- | --- | --- |
 //! | meshes read | `.stl`, `.obj`, `.ply`, `.msh`, `.vtk`, `.vtp`, `.vtu` | [`mesh`] |
 //! | images read | `.vti`, `.raw`, `.nii`, `.tif`, `.nc`, `.nrrd` | [`image`] |
-//! | VTK's files read, as one model | `.vti`, `.vtu`, `.vtp`, legacy `.vtk` | [`vtk`] |
+//! | VTK's files read, as one model | `.vti`, `.vtu`, `.vtp`, each also in pieces, legacy `.vtk` | [`vtk`] |
+//! | lists of files over time read | `.pvd`, `.vti.series` | [`series`] |
 //! | images written | `.vti`, `.raw`, `.png` | [`vti`], [`raw`], [`png`] |
 //! | meshes and sequences written | `.vtu`, `.pvd` | [`vtu`], [`pvd`] |
 //! | figures for ParaView written | a script that finds its images beside itself | [`paraview`] |
@@ -22,6 +23,7 @@ pub mod paraview;
 pub mod png;
 pub mod pvd;
 pub mod raw;
+pub mod series;
 pub mod vti;
 pub mod vtk;
 pub mod vtu;

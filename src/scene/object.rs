@@ -181,10 +181,11 @@ impl Shape<'_> {
 
     /// The files it is read from, those among them that only a header names; paths are relative to `folder`.
     pub fn input_files(&self, folder: &Path) -> Vec<PathBuf> {
+        let of_mesh = |file: PathBuf| [crate::io::mesh::data_files(&file), vec![file]].concat();
         match self {
-            Shape::File(path) => vec![folder.join(path)],
-            Shape::Extrude(spec) => vec![folder.join(&spec.mesh)],
-            Shape::Spin(spec) => vec![folder.join(&spec.mesh)],
+            Shape::File(path) => of_mesh(folder.join(path)),
+            Shape::Extrude(spec) => of_mesh(folder.join(&spec.mesh)),
+            Shape::Spin(spec) => of_mesh(folder.join(&spec.mesh)),
             Shape::Isosurface(spec) => spec.input_files(folder),
             _ => Vec::new(),
         }
