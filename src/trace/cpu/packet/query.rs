@@ -17,8 +17,8 @@ pub(super) struct Query<'t, const D: usize> {
     pub normal: Vector<D>,
     /// Hits beyond it don't count.
     pub limit: f32,
-    /// The simplex that rays don't hit.
-    pub ignored: Option<u32>,
+    /// The simplices that rays don't hit.
+    pub ignored: &'t [u32],
 }
 
 impl<'t, const D: usize> Query<'t, D> {
@@ -27,7 +27,7 @@ impl<'t, const D: usize> Query<'t, D> {
         position: Vector<D>,
         normal: Vector<D>,
         limit: f32,
-        ignored: Option<u32>,
+        ignored: &'t [u32],
     ) -> Self {
         let wide = tracer.wide();
         let (scaled, centred) = (wide.scale.scaled(&position), wide.scale.centred(&position));
