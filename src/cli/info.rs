@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use ao4d::inspect;
+use ao4d::progress::Progress;
 use clap::Args;
 
 use super::console::Console;
+use super::watch::Watch;
 use super::{Failure, Outcome};
 
 /// What `info` takes.
@@ -27,11 +29,14 @@ pub struct Info {
 impl Info {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         super::existing(&self.file)?;
+        let watch = Watch::new(console)?;
+        let running = (&watch as &dyn Progress).stage(&format!("reading {}", self.file.display()), 0);
         let array = self.array.as_deref();
         let info = inspect::Info::read_array(&self.file, array)?;
         if let Some(values) = &self.values {
             inspect::image::write_values(&self.file, array, values)?;
         }
+        running.end();
         if self.json { console.json(&info) } else { console.result(&info.to_string()) }?;
         Ok(Outcome::Done)
     }

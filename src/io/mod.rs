@@ -27,6 +27,6 @@ pub mod vtk;
 pub mod vtu;
 mod xml;
 
-pub use atomic::{AtomicFile, check_free_space, check_writable, free_space};
+pub use atomic::{AtomicFile, Unfinished, abandon, check_free_space, check_writable, free_space, together};
 pub use error::Error;
 pub use input::{Input, InputError};

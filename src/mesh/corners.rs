@@ -149,7 +149,8 @@ fn agree<const D: usize>(a: &Vector64<D>, b: &Vector64<D>, cosine: f64) -> bool 
     a.dot(&b) >= cosine * a.norm() * b.norm()
 }
 
-/// The groups of the corners at one point, each vertex that a group uses apart, the group of the lowest simplex first.
+/// The groups of the corners at one point, each vertex that a group uses apart, the group of the lowest simplex first; of a
+/// sheet with two sides, the groups by their normals.
 fn groups<const D: usize>(
     mesh: &Mesh<D>,
     star: &[Corner],
@@ -178,7 +179,7 @@ fn groups<const D: usize>(
     }
     let mut members: Vec<(u32, usize)> = (0..star.len()).map(|i| (sets.root(i as u32), i)).collect();
     members.sort_unstable();
-    let mut found: Vec<Use<D>> = Vec::new();
+    let mut groups: Vec<(Vector<D>, Vec<Corner>)> = Vec::new();
     let mut at_rest = Vec::new();
     for group in members.chunk_by(|a, b| a.0 == b.0) {
         let corners = || group.iter().map(|&(_, i)| star[i]).filter(|c| !flat(c.simplex));
@@ -191,12 +192,20 @@ fn groups<const D: usize>(
         // A closed fan folded onto itself has none of its own.
         let leading = normal(leader.simplex);
         let sum = if sum.amax() > 1e-12 * leading.amax() { sum } else { leading };
-        let unit = unit(&sum);
+        groups.push((unit(&sum), corners().collect()));
+    }
+    if two_sided {
+        // Not in the order of the simplices, so that it doesn't matter which side is listed first.
+        let place = |normal: &Vector<D>| normal.map(|x| -x);
+        groups.sort_by(|a, b| place(&a.0).partial_cmp(&place(&b.0)).unwrap_or(std::cmp::Ordering::Equal));
+    }
+    let mut found: Vec<Use<D>> = Vec::new();
+    for (normal, corners) in groups {
         let mut slots: HashMap<u32, usize> = HashMap::new();
-        for c in corners() {
+        for c in corners {
             let vertex = mesh.simplices[c.simplex as usize][usize::from(c.place)];
             let slot = *slots.entry(vertex).or_insert_with(|| {
-                found.push(Use { vertex, normal: unit, corners: Vec::new() });
+                found.push(Use { vertex, normal, corners: Vec::new() });
                 found.len() - 1
             });
             found[slot].corners.push((c.simplex, usize::from(c.place)));

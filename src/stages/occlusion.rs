@@ -266,6 +266,7 @@ impl Stage for OcclusionPlan {
             (OcclusionSource::Load(_), None) => return Ok(String::new()),
         };
         // The values last: they are what others look for.
+        let _together = io::together();
         match plan[me].errors_file() {
             Some(errors) => {
                 let bytes = write_whole(&plan.out.join(&errors), &occlusion::encode(&found.errors))?;
