@@ -19,7 +19,7 @@ pub struct Watch<'a> {
 }
 
 /// How long work has to hear Ctrl-C by itself, as nearly all does.
-const PATIENCE: Duration = Duration::from_millis(700);
+const PATIENCE: Duration = Duration::from_millis(600);
 
 struct Current {
     stage: String,
