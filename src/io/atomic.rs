@@ -24,7 +24,7 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// Held while files that belong together get their final names.
 static TOGETHER: RwLock<()> = RwLock::new(());
 
-/// A file that goes with the process, should that be ended in the middle of its work.
+/// A file, or a folder if it is empty then, that goes with the process, should that be ended in the middle of its work.
 #[derive(Debug)]
 pub struct Unfinished(PathBuf);
 
@@ -52,13 +52,14 @@ pub fn together() -> RwLockReadGuard<'static, ()> {
     TOGETHER.read().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Takes away all files that aren't whole. From then on no file gets its final name, and who tries to waits for ever: the
+/// Takes away all files that aren't whole, and folders that were made for them. From then on no file gets its final name, and who tries to waits for ever: the
 /// process is to end at once.
 pub fn abandon() {
     std::mem::forget(TOGETHER.write());
     let files = unfinished();
-    for file in files.iter() {
-        let _ = std::fs::remove_file(file);
+    // What is in a folder goes before the folder.
+    for path in files.iter().rev() {
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
     }
     std::mem::forget(files);
 }

@@ -24,6 +24,9 @@ use crate::geometry::{Dimension, Vector, Vector64, normal_of, widen};
 /// Crease angle where nothing else is said, in degrees: the feature angle of VTK.
 pub const DEFAULT_ANGLE: f64 = 30.0;
 
+/// Normals whose cosine is below minus this point opposite ways.
+const COSINE_OF_SIDES: f64 = 1.0 - 1e-6;
+
 /// Where an object's vertices are split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Crease {
@@ -73,15 +76,7 @@ pub(super) fn split<const D: usize>(
     let normals: Vec<Vector64<D>> = mesh.simplices[simplices.clone()].par_iter().map(|s| normal(mesh, s)).collect();
     let first = simplices.start;
     let flat = |s: u32| mesh.degenerate.binary_search(&s).is_ok();
-    let mut corners: Vec<Corner> = (simplices.clone())
-        .flat_map(|s| {
-            (0..D).map(move |place| {
-                let identity = mesh.identity[mesh.simplices[s][place] as usize];
-                Corner { identity, simplex: s as u32, place: place as u8 }
-            })
-        })
-        .collect();
-    corners.par_sort_unstable();
+    let corners = corners(mesh, simplices.clone());
     let stars: Vec<&[Corner]> = corners.chunk_by(|a, b| a.identity == b.identity).collect();
     // Coordinates are single precision: angles that are equal but for their rounding are equal.
     let cosine = degrees.map(|degrees| libm::cos(degrees.to_radians()) - 1e-6);
@@ -160,11 +155,13 @@ fn groups<const D: usize>(
     sides: &Sides,
 ) -> Vec<Use<D>> {
     let mut sets = UnionFind::new(star.len());
-    let two_sided = star.iter().any(|c| sides.is_two_sided(c.simplex));
+    let cancels = cosine.is_none_or(|cosine| cosine < -COSINE_OF_SIDES) && has_opposed(star, normal, flat, sides);
+    let two_sided = cancels || star.iter().any(|c| sides.is_two_sided(c.simplex));
     for pair in neighbours(mesh, star, flat, sides) {
         let simplices = pair.map(|i| star[i as usize].simplex);
         let [a, b] = simplices.map(normal);
-        if cosine.is_none_or(|cosine| agree(&a, &b, cosine)) && !(two_sided && are_sides(mesh, simplices)) {
+        let sides = || is_opposed(&a, &b) || are_sides(mesh, simplices);
+        if cosine.is_none_or(|cosine| agree(&a, &b, cosine)) && !(two_sided && sides()) {
             sets.join(pair[0], pair[1]);
         }
     }
@@ -221,6 +218,49 @@ fn groups<const D: usize>(
         }
     }
     found
+}
+
+/// Whether two normals point opposite ways.
+fn is_opposed<const D: usize>(a: &Vector64<D>, b: &Vector64<D>) -> bool {
+    a.amax() > 0.0 && b.amax() > 0.0 && agree(a, &-b, COSINE_OF_SIDES)
+}
+
+/// Whether two simplices around a point lie in one hyperplane and face opposite ways: the sides of a sheet that is folded
+/// flat, or that two copies make which are cut into simplices in different ways.
+fn has_opposed<const D: usize>(
+    star: &[Corner],
+    normal: &impl Fn(u32) -> Vector64<D>,
+    flat: &impl Fn(u32) -> bool,
+    sides: &Sides,
+) -> bool {
+    let counts = |c: &&Corner| !flat(c.simplex) && sides.leader(c.simplex).is_none();
+    let normals: Vec<Vector64<D>> = star.iter().filter(counts).map(|c| normal(c.simplex)).collect();
+    // Most points have normals that hardly cancel.
+    let (sum, lengths) =
+        normals.iter().fold((Vector64::<D>::zeros(), 0.0), |(sum, lengths), n| (sum + n, lengths + n.norm()));
+    sum.norm() < 0.99 * lengths && (1..normals.len()).any(|i| normals[..i].iter().any(|n| is_opposed(n, &normals[i])))
+}
+
+/// Whether an object has points with simplices in one hyperplane that face opposite ways.
+pub(super) fn has_flat_folds<const D: usize>(mesh: &Mesh<D>, simplices: Range<usize>, sides: &Sides) -> bool {
+    let flat = |s: u32| mesh.degenerate.binary_search(&s).is_ok();
+    let corners = corners(mesh, simplices);
+    let stars: Vec<&[Corner]> = corners.chunk_by(|a, b| a.identity == b.identity).collect();
+    stars.par_iter().any(|star| has_opposed(star, &|s| normal(mesh, &mesh.simplices[s as usize]), &flat, sides))
+}
+
+/// All corners of some simplices, those at one point together.
+fn corners<const D: usize>(mesh: &Mesh<D>, simplices: Range<usize>) -> Vec<Corner> {
+    let mut corners: Vec<Corner> = simplices
+        .flat_map(|s| {
+            (0..D).map(move |place| {
+                let identity = mesh.identity[mesh.simplices[s][place] as usize];
+                Corner { identity, simplex: s as u32, place: place as u8 }
+            })
+        })
+        .collect();
+    corners.par_sort_unstable();
+    corners
 }
 
 /// Whether two neighbours are on different sides of a sheet: one lies on the other, or they run the same way along the facet

@@ -205,23 +205,24 @@ pub fn build<const D: usize>(
 fn worth_telling<const D: usize>(mesh: &Mesh<D>) -> Vec<String> {
     let total = mesh.simplices.len();
     let mut told = Vec::new();
-    let mut tell = |count: usize, first: u32, what: &str| {
+    let mut tell = |count: usize, first: u32, what: &str, near: bool| {
         let name = &mesh.objects[mesh.object_of(first)].name;
         let at: Vec<String> = mesh.corners(first)[0].iter().map(f32::to_string).collect();
-        told.push(format!("{count} of {total} simplices {what} (the first is number {first}, of {name}, near ({}))", at.join(", ")));
+        let near = if near { format!(", near ({})", at.join(", ")) } else { String::new() };
+        told.push(format!("{count} of {total} simplices {what} (the first is number {first}, of {name}{near})"));
     };
     if let Some(&first) = mesh.degenerate.first() {
-        tell(mesh.degenerate.len(), first, "have measure zero and are left out");
+        tell(mesh.degenerate.len(), first, "have measure zero and are left out", false);
     }
     if let Some(&first) = mesh.turned_over.first() {
         let what = "turned over or flat once rounded to single precision: they are thinner than its steps there, and may \
                     shadow what is beside them";
-        tell(mesh.turned_over.len(), first, what);
+        tell(mesh.turned_over.len(), first, what, true);
     }
     if let Some((first, _)) = mesh.copies.iter().next() {
         let what = "lie on others with the same corners: those that face the same way count once, and of two that face \
                     opposite ways each is seen from its own side";
-        tell(mesh.copies.len(), first, what);
+        tell(mesh.copies.len(), first, what, false);
     }
     told
 }
