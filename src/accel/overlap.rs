@@ -64,7 +64,8 @@ impl<const D: usize> Tracer<D> {
             if cone.contains(&ray.direction) {
                 let there = cone.crossing(&ray.direction);
                 let near = (there.t - here.t).abs() <= there.error + here.error;
-                if near && self.exact_order(ray, other, &cone, simplex).is_eq()
+                if near
+                    && self.exact_order(ray, other, &cone, simplex).is_eq()
                     && let Some(found) = in_place(other)
                 {
                     best = Some(best.map_or(found, |best| best.min(found)));

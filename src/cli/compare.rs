@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use ao4d::inspect;
-use ao4d::progress::Progress;
 use ao4d::inspect::compare::Tolerance;
+use ao4d::progress::Progress;
 use clap::Args;
 
 use super::console::Console;

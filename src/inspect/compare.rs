@@ -255,13 +255,7 @@ impl Differences {
     }
 
     /// What was found; with a grid, places become voxels.
-    pub fn finish(
-        self,
-        name: &str,
-        components: usize,
-        grid: Option<&Grid>,
-        tolerance: &Tolerance,
-    ) -> ArrayComparison {
+    pub fn finish(self, name: &str, components: usize, grid: Option<&Grid>, tolerance: &Tolerance) -> ArrayComparison {
         let comparable = self.count - self.incomparable;
         let place = |(i, [a, b]): (usize, [String; 2])| {
             let (index, component) = (i / components.max(1), i % components.max(1));

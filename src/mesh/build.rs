@@ -133,8 +133,8 @@ impl<const D: usize> MeshBuilder<D> {
                 (Some(_), _) => None,
                 // A vertex has one normal, but not for both sides of a sheet.
                 (None, Crease::Never) => {
-                    let sheets = sides.any_two_sided(&simplices)
-                        || corners::has_flat_folds(&mesh, simplices.clone(), &sides);
+                    let sheets =
+                        sides.any_two_sided(&simplices) || corners::has_flat_folds(&mesh, simplices.clone(), &sides);
                     sheets.then_some(None)
                 }
                 (None, Crease::Above(degrees)) => Some(Some(degrees)),

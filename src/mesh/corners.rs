@@ -80,8 +80,9 @@ pub(super) fn split<const D: usize>(
     let stars: Vec<&[Corner]> = corners.chunk_by(|a, b| a.identity == b.identity).collect();
     // Coordinates are single precision: angles that are equal but for their rounding are equal.
     let cosine = degrees.map(|degrees| libm::cos(degrees.to_radians()) - 1e-6);
-    let uses: Vec<Vec<Use<D>>> =
-        (stars.par_iter()).map(|star| groups(mesh, star, cosine, &|s| normals[s as usize - first], &flat, sides)).collect();
+    let uses: Vec<Vec<Use<D>>> = (stars.par_iter())
+        .map(|star| groups(mesh, star, cosine, &|s| normals[s as usize - first], &flat, sides))
+        .collect();
 
     let mut found = Corners { sources: Vec::new(), normals: vec![Vector::zeros(); vertices.len()], moved: Vec::new() };
     let mut taken = vec![false; vertices.len()];
@@ -210,7 +211,8 @@ fn groups<const D: usize>(
     }
     // A vertex of simplices of measure zero alone has the normal of the point's first group.
     let normal = found.first().map_or_else(Vector::zeros, |u| u.normal);
-    let mut used: HashSet<u32> = if at_rest.is_empty() { HashSet::new() } else { found.iter().map(|u| u.vertex).collect() };
+    let mut used: HashSet<u32> =
+        if at_rest.is_empty() { HashSet::new() } else { found.iter().map(|u| u.vertex).collect() };
     for c in at_rest {
         let vertex = mesh.simplices[c.simplex as usize][usize::from(c.place)];
         if used.insert(vertex) {

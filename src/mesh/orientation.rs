@@ -72,7 +72,8 @@ struct Component {
 fn components<const D: usize>(corners: &[[u32; D]], copies: &Copies) -> (Vec<Component>, Vec<bool>) {
     let mut facets = sorted_facets(corners);
     // A simplex with two equal corners has no facet that isn't doubled or degenerate itself.
-    facets.retain(|facet| !has_double(&corners[facet.simplex as usize]) && copies.first(facet.simplex) == facet.simplex);
+    facets
+        .retain(|facet| !has_double(&corners[facet.simplex as usize]) && copies.first(facet.simplex) == facet.simplex);
     let mut neighbours: Vec<[Option<(u32, bool)>; D]> = vec![[None; D]; corners.len()];
     let mut open = vec![false; corners.len()];
     for around in facets.chunk_by(|a, b| a.corners == b.corners) {

@@ -70,12 +70,21 @@ mod tests {
         };
         assert_eq!(available_below(root), None);
         write("proc/meminfo", "MemTotal: 9000 kB\nMemAvailable:    8000 kB\n");
-        write("proc/self/limits", "Limit   Soft Limit  Hard Limit  Units\nMax data size   unlimited   unlimited   bytes\n");
+        write(
+            "proc/self/limits",
+            "Limit   Soft Limit  Hard Limit  Units\nMax data size   unlimited   unlimited   bytes\n",
+        );
         write("proc/self/status", "VmSize:\t    1000 kB\nVmData:\t     500 kB\n");
         assert_eq!(available_below(root), Some(8000 << 10));
-        write("proc/self/limits", "Max data size   7168000  unlimited  bytes\nMax address space  unlimited  unlimited  bytes\n");
+        write(
+            "proc/self/limits",
+            "Max data size   7168000  unlimited  bytes\nMax address space  unlimited  unlimited  bytes\n",
+        );
         assert_eq!(available_below(root), Some(6500 << 10));
-        write("proc/self/limits", "Max data size   7168000  unlimited  bytes\nMax address space  7168000  unlimited  bytes\n");
+        write(
+            "proc/self/limits",
+            "Max data size   7168000  unlimited  bytes\nMax address space  7168000  unlimited  bytes\n",
+        );
         assert_eq!(available_below(root), Some(6000 << 10));
         // Version 2: a limit may be that of a group around the own one.
         write("proc/self/cgroup", "0::/a/b\n");

@@ -22,13 +22,7 @@ pub(super) struct Query<'t, const D: usize> {
 }
 
 impl<'t, const D: usize> Query<'t, D> {
-    pub fn new(
-        tracer: &'t Tracer<D>,
-        position: Vector<D>,
-        normal: Vector<D>,
-        limit: f32,
-        ignored: &'t [u32],
-    ) -> Self {
+    pub fn new(tracer: &'t Tracer<D>, position: Vector<D>, normal: Vector<D>, limit: f32, ignored: &'t [u32]) -> Self {
         let wide = tracer.wide();
         let (scaled, centred) = (wide.scale.scaled(&position), wide.scale.centred(&position));
         Self { tracer, wide, position, scaled, centred, normal, limit, ignored }
