@@ -17,7 +17,8 @@ use ao4d::mesh::Mesh;
 use ao4d::occlusion::Estimator;
 use ao4d::pipeline::Pipeline;
 use ao4d::progress::Silent;
-use ao4d::render::filters::Denoise;
+use ao4d::render::filters::denoise::Refine;
+use ao4d::render::filters::{ImageFilter, denoise};
 use ao4d::render::{Aov, Renderer, Shading};
 use ao4d::stages::camera::camera;
 use ao4d::stages::render::RenderPlan;
@@ -94,23 +95,29 @@ fn measure<const D: usize>(name: &str, pipeline: &Pipeline, mesh: Mesh<D>, longe
         };
         row("smooth", rays, points.len(), image(smooth));
     }
-    for rays in [64, 128, 256] {
-        for own in [4, 16] {
+    for rays in [64, 256] {
+        for (own, tolerance) in
+            [(4, None), (16, None), (4, Some(0.01)), (8, Some(0.01)), (16, Some(0.01)), (16, Some(0.005))]
+        {
             let auto = || {
                 let found = by_rays(rays).estimate(&*backend, &points, None, &Silent).expect("nobody cancels");
                 let mut renderer = renderer(Shading::Auto(Arc::new(found), by_rays(own)));
-                renderer.filters.push(Box::new(Denoise::new(&renderer.camera, &renderer.grid, own)));
+                renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, Sampling::new(own, 1)));
+                let most = Sampling::new(256, 1);
+                let refine = |t| Box::new(Refine::new(Arc::clone(&backend), most, t)) as Box<dyn ImageFilter<D>>;
+                renderer.filters.extend(tolerance.map(refine));
                 renderer
             };
             let asked = points.len() + count * own as usize / rays as usize;
-            row(&format!("auto, {own} a voxel"), rays, asked, image(auto));
+            let told = tolerance.map_or(String::new(), |t| format!(", to {t}"));
+            row(&format!("auto, {own} a voxel{told}"), rays, asked, image(auto));
         }
     }
     for rays in [1, 4, 16, 64] {
         row("voxel", rays, count, image(|| renderer(Shading::Voxel(by_rays(rays)))));
         let filtered = || {
             let mut renderer = renderer(Shading::Voxel(by_rays(rays)));
-            renderer.filters.push(Box::new(Denoise::new(&renderer.camera, &renderer.grid, rays)));
+            renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, Sampling::new(rays, 1)));
             renderer
         };
         row("voxel, denoised", rays, count, image(filtered));

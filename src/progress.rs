@@ -34,6 +34,19 @@ impl Progress for Silent {
     fn end(&self) {}
 }
 
+/// Hears the wish to stop from somebody, and tells of no steps: for work that is counted elsewhere.
+pub struct Uncounted<'p>(pub &'p dyn Progress);
+
+impl Progress for Uncounted<'_> {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _steps: u64) {}
+    fn end(&self) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
 /// The work was cancelled by whoever watches its progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted")]

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 /// Whether a terminal obeys the character, or lets it turn the order of those around it.
-fn is_command(c: char) -> bool {
+pub(crate) fn is_command(c: char) -> bool {
     let control = c.is_control() && !matches!(c, '\n' | '\t');
     control || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
 }

@@ -26,6 +26,7 @@ stages:
   - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, camera: {projection: parallel, height: 2}}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
+  - mesh: {id: m, input: s, occlusion: none, vtu: m.vtu}
   - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
 ";
 
@@ -34,6 +35,9 @@ stages:
 const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("PipelineSpec.name", Ok("name=q")),
     ("PipelineSpec.seed", Ok("seed=3")),
+    ("PipelineSpec.program", Err("tells who wrote the pipeline, and warns")),
+    ("PipelineSpec.folder", Err("where inputs are; their content takes part")),
+    ("PipelineSpec.inputs", Err("what inputs must be; what they are takes part")),
     ("PipelineSpec.stages", Err("the stages follow")),
     ("SceneSpec.id", Err("a name for other stages")),
     ("SceneSpec.dimension", Err("changes what everything else may be; see `a_scene_s_dimension_counts`")),
@@ -75,6 +79,10 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("WriteSpec.arrays", Ok("w.arrays=[opacity, rgba]")),
     ("WriteSpec.encoding", Ok("w.encoding=inline")),
     ("WriteSpec.compression", Ok("w.compression=zlib")),
+    ("MeshSpec.id", Err("a name for other stages")),
+    ("MeshSpec.input", Ok("m.input=other")),
+    ("MeshSpec.occlusion", Ok("m.occlusion=o2")),
+    ("MeshSpec.vtu", Err("a file doesn't depend on its name")),
     ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.state", Err("a state is held against the file that is there, whole")),

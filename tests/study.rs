@@ -81,7 +81,21 @@ fn check(pipeline: &str, with_image: bool) {
     assert!(error("sobol", "4096") < 0.6 * error("random", "4096"));
     assert!(error("sobol", "65536") < 1e-3);
     assert!(error("as_published", "4096") > 0.3);
-    assert_eq!(found.iter().filter(|r| r["kind"] == "image").count(), if with_image { 11 } else { 0 });
+    let of = |shading: &str| found.iter().filter(|r| r["kind"] == "image" && r["method"] == shading).count();
+    let shadings = ["flat", "smooth", "voxel", "voxel+denoise", "auto"].map(of);
+    assert_eq!(shadings, if with_image { [4, 4, 4, 4, 3] } else { [0; 5] });
+    if with_image {
+        // Rays at each voxel converge to the truth; a filter makes much of few of them.
+        let image = |shading: &str, samples: &str| -> f64 {
+            let one = |r: &&std::collections::BTreeMap<String, String>| {
+                r["kind"] == "image" && r["method"] == shading && r["samples"] == samples
+            };
+            found.iter().find(one).unwrap()["rmse"].parse().unwrap()
+        };
+        assert!(image("voxel", "256") < 0.3 * image("voxel", "16"));
+        assert!(image("voxel+denoise", "4") < 0.8 * image("voxel", "4"));
+        assert!(image("auto", "256") < image("voxel", "16"));
+    }
 
     let svg = std::fs::read_to_string(out.join("study.svg")).unwrap();
     let picture = roxmltree::Document::parse(&svg).unwrap();
@@ -89,7 +103,9 @@ fn check(pipeline: &str, with_image: bool) {
     for name in ["as_published", "random", "sobol", "exact"] {
         assert!(texts.contains(&name), "{name}");
     }
-    assert_eq!(texts.contains(&"smooth"), with_image);
+    for name in ["flat", "smooth", "voxel", "voxel+denoise", "auto"] {
+        assert_eq!(texts.contains(&name), with_image, "{name}");
+    }
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
 
     // The same errors on any number of threads; only times differ.

@@ -7,7 +7,8 @@ use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64};
 use ao4d::mesh::{Mesh, Surface};
 use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
-use ao4d::render::filters::{Denoise, Dilate};
+use ao4d::render::filters::denoise::Refine;
+use ao4d::render::filters::{Dilate, denoise};
 use ao4d::render::{Aov, Camera, Projection, Renderer, Shading, Slab, View};
 use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
 use ao4d::trace::{NOTHING, RayBackend, Sampling};
@@ -272,7 +273,8 @@ fn slabs<const D: usize>() {
             let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading.clone());
             renderer.supersample = supersample;
             if filtered {
-                renderer.filters.push(Box::new(Denoise::new(&camera, &renderer.grid, 16)));
+                renderer.filters.extend(denoise(&camera, &renderer.grid, Sampling::new(16, 1)));
+                renderer.filters.push(Box::new(Refine::new(Arc::clone(&backend), Sampling::new(64, 1), 0.02)));
                 renderer.filters.push(Box::new(Dilate { layers: 3 }));
             }
             let whole = renderer.volume(Aov::ALL, &Silent).unwrap().arrays;

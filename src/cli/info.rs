@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use ao4d::inspect;
+use ao4d::pipeline::Told;
 use ao4d::progress::Progress;
 use clap::Args;
 
@@ -21,6 +22,9 @@ pub struct Info {
     /// Also write an image's values there, as little-endian float64, x fastest, then y, z, time
     #[arg(long, value_name = "FILE")]
     values: Option<PathBuf>,
+    /// Print the pipeline that made the file, as YAML that makes it again
+    #[arg(long, conflicts_with_all = ["array", "values", "json"])]
+    pipeline: bool,
     /// Print it as JSON
     #[arg(long)]
     json: bool,
@@ -29,6 +33,12 @@ pub struct Info {
 impl Info {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         super::existing(&self.file)?;
+        if self.pipeline {
+            let told = Told::read(&self.file)?;
+            told.notes.iter().for_each(|note| console.note(&format!("warning: {}: {note}", self.file.display())));
+            console.result(&told.text)?;
+            return Ok(Outcome::Done);
+        }
         let watch = Watch::new(console)?;
         let running = (&watch as &dyn Progress).stage(&format!("reading {}", self.file.display()), 0);
         let array = self.array.as_deref();

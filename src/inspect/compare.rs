@@ -3,14 +3,14 @@
 //! Two numbers agree if `|a - b| <= atol + rtol |b|`, the rule of numpy's `allclose`, with b the reference. Equal
 //! infinities agree, and so do two NaNs; a NaN or an infinity against anything else differs, and counts as
 //! incomparable because no difference can be told. Integers are subtracted as integers, so that 64-bit ones do not
-//! round. Whatever exists on one side only is a difference too, as is another grid or other cells. Field data is not
-//! compared: it says how a file was made, not what it shows.
+//! round. Whatever exists on one side only is a difference too, as is another grid or other cells. Field data is
+//! compared only where a text of it is asked for by its name: it says how a file was made, not what it shows.
 
 use std::fmt;
 
 use serde::Serialize;
 
-use crate::io::vtk::{DataSet, Image, UnstructuredGrid};
+use crate::io::vtk::{DataSet, Field, Image, UnstructuredGrid};
 use crate::volume::{Array, Grid, Values, Volume};
 
 /// What still counts as the same.
@@ -98,6 +98,7 @@ pub fn images(a: &Image, b: &Image, tolerance: &Tolerance) -> Comparison {
     let grid = (a.grid.dimensions == b.grid.dimensions).then_some(&a.grid);
     comparison.lists("", &a.point_arrays, &b.point_arrays, grid, tolerance);
     comparison.lists("cell ", &a.cell_arrays, &b.cell_arrays, None, tolerance);
+    comparison.texts(&a.field_data, &b.field_data, tolerance);
     comparison.finish(tolerance)
 }
 
@@ -122,6 +123,7 @@ pub fn meshes(a: &UnstructuredGrid, b: &UnstructuredGrid, tolerance: &Tolerance)
     }
     comparison.lists("", &a.point_arrays, &b.point_arrays, None, tolerance);
     comparison.lists("cell ", &a.cell_arrays, &b.cell_arrays, None, tolerance);
+    comparison.texts(&a.field_data, &b.field_data, tolerance);
     comparison.finish(tolerance)
 }
 
@@ -131,6 +133,11 @@ pub fn lists(name: &str, a: &Values, b: &Values, tolerance: &Tolerance) -> Compa
     let mut comparison = Comparison::default();
     comparison.lists("", &list(a), &list(b), None, tolerance);
     comparison.finish(tolerance)
+}
+
+/// The text of this name in the field data.
+pub(super) fn text_of(fields: &[Field], name: &str) -> Option<String> {
+    fields.iter().find(|field| matches!(field, Field::Text(own, _) if own == name)).map(Field::text)
 }
 
 impl Tolerance {
@@ -187,6 +194,32 @@ impl Comparison {
     /// Of one array.
     pub(super) fn of(array: ArrayComparison) -> Self {
         Self { same: array.same, differences: Vec::new(), arrays: vec![array] }
+    }
+
+    /// Texts of the field data that are asked for by name.
+    fn texts(&mut self, a: &[Field], b: &[Field], tolerance: &Tolerance) {
+        for name in &tolerance.arrays {
+            let (x, y) = (text_of(a, name), text_of(b, name));
+            match (&x, &y) {
+                (None, None) => continue,
+                (Some(_), None) => self.differences.push(format!("text array `{name}` is only in the first")),
+                (None, Some(_)) => self.differences.push(format!("text array `{name}` is only in the second")),
+                (Some(x), Some(y)) if x == y => self.arrays.push(ArrayComparison {
+                    name: name.clone(),
+                    count: x.len(),
+                    different: 0,
+                    incomparable: 0,
+                    largest: 0.0,
+                    rms: 0.0,
+                    at: None,
+                    same: true,
+                }),
+                (Some(x), Some(y)) => {
+                    let line = x.lines().zip(y.lines()).take_while(|(x, y)| x == y).count() + 1;
+                    self.differences.push(format!("text array `{name}`, from line {line} on"));
+                }
+            }
+        }
     }
 
     fn finish(mut self, tolerance: &Tolerance) -> Self {

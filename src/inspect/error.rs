@@ -63,6 +63,14 @@ pub enum Error {
         /// How much there is.
         available: u64,
     },
+    /// A file that tells of no pipeline.
+    #[error("{}: tells of no pipeline: {message}", path.display())]
+    Pipeline {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        message: String,
+    },
     /// Two files that have nothing in common.
     #[error("{} is {first} and {} is {second}; give two of a kind", a.display(), b.display())]
     Kinds {

@@ -11,6 +11,7 @@ use super::image::ImageSummary;
 use super::range::Short;
 use super::surface::SurfaceSummary;
 use super::{ArraySummary, COLOURS, Contents, Error, OCCLUSION, Range};
+use crate::io::PIPELINE;
 use crate::io::vtk::{Field, Image, UnstructuredGrid, cell_name};
 use crate::occlusion::Sidecar;
 use crate::volume::{Array, Values};
@@ -220,7 +221,10 @@ impl fmt::Display for Description {
                 writeln!(f, "ambient occlusion at {} vertices", values.tuples)?;
                 values.ranges.iter().try_for_each(|range| writeln!(f, "{range}"))?;
                 match sidecar {
-                    Some(sidecar) => f.write_str(&sidecar.to_yaml()),
+                    Some(sidecar) => {
+                        f.write_str(&Sidecar { pipeline: None, ..sidecar.clone() }.to_yaml())?;
+                        sidecar.pipeline.iter().try_for_each(|text| writeln!(f, "pipeline: {}", Pipeline(text)))
+                    }
                     None => writeln!(f, "no sidecar beside it says what they are the values of"),
                 }
             }
@@ -244,7 +248,21 @@ fn field_lines(f: &mut fmt::Formatter<'_>, fields: &Map<String, Value>) -> fmt::
     if !fields.is_empty() {
         writeln!(f, "field data:")?;
     }
-    fields.iter().try_for_each(|(name, text)| writeln!(f, "  {name}: {}", text.as_str().unwrap_or_default()))
+    fields.iter().try_for_each(|(name, text)| match text.as_str().unwrap_or_default() {
+        text if name == PIPELINE && text.contains("\nstages:") => writeln!(f, "  {name}: {}", Pipeline(text)),
+        text => writeln!(f, "  {name}: {text}"),
+    })
+}
+
+/// A pipeline's text where only that it is there is told.
+struct Pipeline<'a>(&'a str);
+
+impl fmt::Display for Pipeline<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lines = self.0.lines().collect::<Vec<_>>();
+        let name = lines.iter().find_map(|line| line.strip_prefix("name: ")).unwrap_or_default();
+        write!(f, "{name}, {} lines of YAML, which `ao4d info --pipeline` prints", lines.len())
+    }
 }
 
 /// Numbers in parentheses.

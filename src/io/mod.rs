@@ -27,6 +27,9 @@ pub mod vtk;
 pub mod vtu;
 mod xml;
 
+/// The name under which files tell of the pipeline that they were made by.
+pub const PIPELINE: &str = "pipeline";
+
 pub use atomic::{AtomicFile, Unfinished, abandon, check_free_space, check_writable, free_space, together};
 pub use error::Error;
 pub use input::{Input, InputError};

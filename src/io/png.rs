@@ -8,7 +8,7 @@
 //! Slices are picked out of slabs as they come ([`Slices::add_slab`]), so the image itself need not be kept. Several
 //! images, without and with occlusion say, are stacked in rows ([`write()`]).
 
-use std::io::Write;
+use std::io::{Cursor, Write};
 
 use super::Error;
 use crate::volume::Grid;
@@ -145,6 +145,14 @@ impl Slices {
 /// # Errors
 /// If there are none, or the sink fails.
 pub fn write(sink: impl Write, rows: &[&Slices]) -> Result<(), Error> {
+    write_told(sink, rows, None)
+}
+
+/// The same with a text, which any program shows that tells what is in a PNG, under this name.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_told(sink: impl Write, rows: &[&Slices], text: Option<(&str, &str)>) -> Result<(), Error> {
     let rows: Vec<Canvas> = rows.iter().map(|s| s.row()).collect();
     let width = rows.iter().map(|r| r.width).max().unwrap_or(0);
     // Between rows there is one margin, be it that of a row of framed slices, which brings its own, or another.
@@ -162,13 +170,48 @@ pub fn write(sink: impl Write, rows: &[&Slices]) -> Result<(), Error> {
             canvas.rgb[start..start + line.len()].copy_from_slice(line);
         }
     }
-    let mut encoder = ::png::Encoder::new(sink, width as u32, height as u32);
+    encode(sink, width as u32, height as u32, &canvas.rgb, text)
+}
+
+fn encode(sink: impl Write, width: u32, height: u32, rgb: &[u8], text: Option<(&str, &str)>) -> Result<(), Error> {
+    let mut encoder = ::png::Encoder::new(sink, width, height);
     encoder.set_color(::png::ColorType::Rgb);
     encoder.set_depth(::png::BitDepth::Eight);
+    if let Some((name, text)) = text {
+        encoder.add_itxt_chunk(name.to_owned(), text.to_owned())?;
+    }
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&canvas.rgb)?;
+    writer.write_image_data(rgb)?;
     writer.finish()?;
     Ok(())
+}
+
+/// The text that a PNG has under this name, whatever made the file; none if there is none.
+///
+/// # Errors
+/// If it is no PNG, or damaged.
+pub fn text(bytes: &[u8], name: &str) -> Result<Option<String>, String> {
+    let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().map_err(|e| e.to_string())?;
+    // Texts may stand behind the picture, too.
+    reader.finish().map_err(|e| e.to_string())?;
+    let info = reader.info();
+    if let Some(chunk) = info.utf8_text.iter().find(|chunk| chunk.keyword == name) {
+        return chunk.get_text().map(Some).map_err(|e| e.to_string());
+    }
+    Ok(info.uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == name).map(|chunk| chunk.text.clone()))
+}
+
+/// Makes a PNG of ours again with another text under this name.
+///
+/// # Errors
+/// If it is none of ours, or the sink fails.
+pub fn retell(bytes: &[u8], sink: impl Write, text: (&str, &str)) -> Result<(), Error> {
+    let damaged = |e: ::png::DecodingError| Error::Write(std::io::Error::new(std::io::ErrorKind::InvalidData, e));
+    let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().map_err(damaged)?;
+    let size = reader.output_buffer_size().unwrap_or_default();
+    let mut pixels = vec![0; size];
+    let frame = reader.next_frame(&mut pixels).map_err(damaged)?;
+    encode(sink, frame.width, frame.height, &pixels, Some(text))
 }
 
 impl Canvas {

@@ -4,13 +4,14 @@
 //! is in memory as a whole, its text is not. The points lie in ParaView's 3D, so what they were in 4D goes into a `position`
 //! array.
 
-use std::io::{self, Write};
+use std::io::{self, BufRead, Write};
 
 use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
 
 use super::Error;
 use super::vtk::cell::{TETRAHEDRON, TRIANGLE};
+use super::vtk::text::text_array;
 use super::xml::escape;
 use crate::volume::{Array, Kind, Values};
 
@@ -38,6 +39,21 @@ pub fn write(
     point_arrays: &[Array],
     cell_arrays: &[Array],
 ) -> Result<(), Error> {
+    write_told(sink, points, cells, point_arrays, cell_arrays, &[])
+}
+
+/// The same with texts in the field data, each under its name.
+///
+/// # Errors
+/// As [`write()`], and if a name can't be written.
+pub fn write_told(
+    sink: impl Write,
+    points: &[[f32; 3]],
+    cells: Cells<'_>,
+    point_arrays: &[Array],
+    cell_arrays: &[Array],
+    texts: &[(&str, &str)],
+) -> Result<(), Error> {
     let (flat, size, kind) = match cells {
         Cells::Triangles(c) => (c.as_flattened(), 3, TRIANGLE),
         Cells::Tetrahedra(c) => (c.as_flattened(), 4, TETRAHEDRON),
@@ -54,8 +70,19 @@ pub fn write(
     write!(
         file.sink,
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
-         header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece {piece}>\n<PointData>\n"
+         header_type=\"UInt64\">\n<UnstructuredGrid>\n"
     )?;
+    if !texts.is_empty() {
+        file.text("<FieldData>\n")?;
+        for (name, text) in texts {
+            if name.is_empty() || name.contains(|c: char| c.is_control()) || text.contains('\0') {
+                return Err(Error::Name { what: "the field data name", name: (*name).to_owned() });
+            }
+            writeln!(file.sink, "{}", text_array(name, text))?;
+        }
+        file.text("</FieldData>\n")?;
+    }
+    write!(file.sink, "<Piece {piece}>\n<PointData>\n")?;
     point_arrays.iter().try_for_each(|array| file.array(array))?;
     file.text("</PointData>\n<CellData>\n")?;
     cell_arrays.iter().try_for_each(|array| file.array(array))?;
@@ -74,6 +101,14 @@ pub fn write(
     file.data("types", Kind::U8, 1, count, |range, bytes| bytes.extend(range.map(|_| kind)))?;
     file.text("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n")?;
     Ok(file.sink.flush()?)
+}
+
+/// Copies a file that this writer made, with another text in its field data under this name.
+///
+/// # Errors
+/// If it has no such text, or reading or writing fails.
+pub fn retell(mut source: impl BufRead, mut sink: impl Write, text: (&str, &str)) -> Result<(), Error> {
+    super::vtk::text::retell(&mut source, &mut sink, text, |_, _| Ok(()))
 }
 
 /// A file in the making.

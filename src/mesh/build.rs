@@ -90,7 +90,7 @@ impl<const D: usize> MeshBuilder<D> {
             components: 0,
             closed_components: 0,
         });
-        let normals = surface.normals.as_ref().map(|n| n.iter().map(normals::unit).collect());
+        let normals = surface.normals.as_ref().map(|n| n.iter().map(normals::unit_if_not).collect());
         self.added.push(Added { open, crease, normals });
         Ok(())
     }

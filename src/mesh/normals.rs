@@ -57,3 +57,11 @@ pub fn unit<const D: usize>(v: &Vector64<D>) -> crate::geometry::Vector<D> {
         narrow(&Vector64::zeros())
     }
 }
+
+/// The same, but that a vector of length 1, as well as `f32` can say, stays as it is: a mesh that is written and read has
+/// the very normals that it had.
+pub fn unit_if_not<const D: usize>(v: &Vector64<D>) -> crate::geometry::Vector<D> {
+    let rounded = narrow(v);
+    let length = widen(&rounded).norm();
+    if (length - 1.0).abs() < 1e-6 { rounded } else { unit(v) }
+}

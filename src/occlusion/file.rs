@@ -30,6 +30,8 @@ pub struct Sidecar {
     pub mesh: String,
     /// Name and version of the program.
     pub program: String,
+    /// The pipeline that the values were computed by, as YAML.
+    pub pipeline: Option<String>,
 }
 
 /// Why an occlusion file isn't one, or not that of this mesh.
@@ -95,6 +97,10 @@ impl Sidecar {
         line("error_estimate", &format!("{:.6}", self.error_estimate));
         line("mesh", &self.mesh);
         line("program", &self.program);
+        if let Some(pipeline) = &self.pipeline {
+            text.push_str("pipeline: |\n");
+            pipeline.lines().for_each(|line| text.extend(["  ", line, "\n"]));
+        }
         text
     }
 
@@ -143,9 +149,13 @@ mod tests {
             error_estimate: 0.0125,
             mesh: "00ff".into(),
             program: "ao4d 0.1.0".into(),
+            pipeline: None,
         };
         let text = sidecar.to_yaml();
         assert_eq!(Sidecar::from_yaml(&text), Ok(sidecar.clone()));
+        let told = "program: ao4d 0.1.0\nname: \"# p\"\nstages:\n  - scene: {objects: []}\n";
+        let telling = Sidecar { pipeline: Some(told.into()), ..sidecar.clone() };
+        assert_eq!(Sidecar::from_yaml(&telling.to_yaml()), Ok(telling));
         let plain = Sidecar {
             samples: None,
             target_error: None,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use super::cache::{self, Cache};
+use super::cache::{self, Cache, MadeBy};
 use super::report::{FileReport, Report};
 use crate::io;
 use crate::stages::scene::ScenePlan;
@@ -17,6 +17,7 @@ pub(super) struct Book {
     /// The key of each file.
     keys: BTreeMap<PathBuf, String>,
     stale: BTreeSet<PathBuf>,
+    made_by: MadeBy,
     /// What is told of the scene that is worked on.
     scene_notes: Vec<String>,
     report: Report,
@@ -24,12 +25,12 @@ pub(super) struct Book {
 
 impl Book {
     /// Looks at what earlier runs left. With `force` all has to be made again.
-    pub fn open(plan: &Plan, keys: &Keys, force: bool) -> Self {
+    pub fn open(plan: &Plan, keys: &Keys, made_by: MadeBy, force: bool) -> Self {
         sweep(plan);
         let cache = Cache::open(&plan.out, force);
         let outputs: Vec<_> = (0..plan.stages.len()).map(|stage| plan.outputs(stage, keys)).collect();
         let (mut known, mut stale) = (BTreeMap::new(), BTreeSet::new());
-        for Output { file, beside, key } in outputs.iter().flatten() {
+        for Output { file, beside, key, .. } in outputs.iter().flatten() {
             let all = || std::iter::once(file).chain(beside);
             if !all().all(|file| cache.is_fresh(file, key)) {
                 stale.insert(file.clone());
@@ -37,12 +38,29 @@ impl Book {
             known.extend(all().map(|file| (file.clone(), key.clone())));
         }
         let report = Report { out: plan.out.clone(), ..Report::default() };
-        Self { cache, outputs, keys: known, stale, scene_notes: Vec::new(), report }
+        Self { cache, outputs, keys: known, stale, made_by, scene_notes: Vec::new(), report }
     }
 
     /// Whether any file has to be made, figures aside.
     pub fn anything(&self) -> bool {
         !self.stale.is_empty()
+    }
+
+    /// Lets those files that are as they were, but for what they tell of the pipeline, tell what it is now.
+    ///
+    /// # Errors
+    /// If one can't be read or written.
+    pub fn retell(&mut self, plan: &Plan, text: &str) -> Result<(), io::Error> {
+        for (stage, outputs) in self.outputs.iter().enumerate() {
+            for Output { file, key, tells, .. } in outputs.iter().filter(|output| !self.stale.contains(&output.file)) {
+                if let Some(tells) = tells.as_ref().filter(|file| !self.cache.tells(file, &self.made_by.told)) {
+                    plan.retell(stage, file, text)?;
+                    let notes = self.cache.notes(tells).to_vec();
+                    self.cache.record(tells, key, notes, &self.made_by)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Whether anything has to be made of a scene.
@@ -93,7 +111,7 @@ impl Ledger for Book {
         self.tell(&notes);
         if let Some(key) = self.keys.get(file).filter(|_| !unchanged) {
             let told = self.scene_notes.iter().chain(&notes).cloned().collect();
-            self.cache.record(file, key, told)?;
+            self.cache.record(file, key, told, &self.made_by)?;
         }
         if named {
             self.report.files.push(FileReport { path: file.to_owned(), bytes, cached: unchanged });

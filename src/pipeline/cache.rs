@@ -26,6 +26,31 @@ struct Entry {
     /// What the user was told of it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     notes: Vec<String>,
+    /// The hash of what it tells of the pipeline.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    told: Option<String>,
+    /// Where the pipeline was whose inputs it is made of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    folder: Option<String>,
+}
+
+/// What a file was made by.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MadeBy {
+    /// The hash of what files tell of the pipeline.
+    pub told: String,
+    /// Where paths of inputs start, as an absolute path.
+    pub folder: Option<String>,
+}
+
+/// Where the pipeline was that a file was made by, if the file still is in its output folder.
+pub fn folder_of(file: &Path) -> Option<PathBuf> {
+    let file = file.canonicalize().ok()?;
+    file.ancestors().skip(1).find_map(|out| {
+        let entries = Cache::open(out, false).entries;
+        let entry = entries.get(&file.strip_prefix(out).ok()?.to_string_lossy()[..])?;
+        entry.folder.as_ref().map(PathBuf::from)
+    })
 }
 
 /// What is known of the files in an output folder.
@@ -50,6 +75,11 @@ impl Cache {
         !self.force && known.is_some_and(|e| e.key == key && found() == Some((e.bytes, e.modified.clone())))
     }
 
+    /// Whether the file tells of the pipeline what has this hash.
+    pub fn tells(&self, file: &Path, told: &str) -> bool {
+        self.entries.get(&file.to_string_lossy()[..]).is_some_and(|entry| entry.told.as_deref() == Some(told))
+    }
+
     /// What the user was told of a file.
     pub fn notes(&self, file: &Path) -> &[String] {
         self.entries.get(&file.to_string_lossy()[..]).map_or(&[], |entry| &entry.notes)
@@ -66,9 +96,10 @@ impl Cache {
     ///
     /// # Errors
     /// If the folder can't be written to.
-    pub fn record(&mut self, file: &Path, key: &str, notes: Vec<String>) -> Result<(), io::Error> {
+    pub fn record(&mut self, file: &Path, key: &str, notes: Vec<String>, by: &MadeBy) -> Result<(), io::Error> {
         if let Some((bytes, modified)) = self.state(file) {
-            let entry = Entry { key: key.to_owned(), bytes, modified, notes };
+            let (told, folder) = (Some(by.told.clone()), by.folder.clone());
+            let entry = Entry { key: key.to_owned(), bytes, modified, notes, told, folder };
             self.entries.insert(file.to_string_lossy().into_owned(), entry);
         }
         self.save()
@@ -102,10 +133,17 @@ mod tests {
         std::fs::write(folder.path().join(file), "one").unwrap();
         let mut cache = Cache::open(folder.path(), false);
         assert!(!cache.is_fresh(file, "k"));
-        cache.record(file, "k", vec!["note".to_owned()]).unwrap();
+        let by = MadeBy { told: "t".to_owned(), folder: None };
+        cache.record(file, "k", vec!["note".to_owned()], &by).unwrap();
         let cache = Cache::open(folder.path(), false);
         assert!(cache.is_fresh(file, "k") && !cache.is_fresh(file, "l"));
         assert_eq!(cache.notes(file), ["note"]);
+        assert!(cache.tells(file, "t") && !cache.tells(file, "u"));
+        assert_eq!(folder_of(&folder.path().join(file)), None);
+        let mut cache = cache;
+        let by = MadeBy { folder: Some("/where".to_owned()), ..by };
+        cache.record(file, "k", Vec::new(), &by).unwrap();
+        assert_eq!(folder_of(&folder.path().join(file)), Some(PathBuf::from("/where")));
         assert!(!Cache::open(folder.path(), true).is_fresh(file, "k"));
         std::fs::write(folder.path().join(file), "other").unwrap();
         assert!(!cache.is_fresh(file, "k"));

@@ -89,6 +89,11 @@ impl Document {
         Error::Refused(Box::new(Refusal { place: self.place(origin), path, message }))
     }
 
+    /// The tree, with all overrides applied.
+    pub(super) fn root(&self) -> &Node {
+        &self.root
+    }
+
     /// The file's name as messages say it.
     pub fn file(&self) -> &str {
         &self.file

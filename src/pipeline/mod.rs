@@ -18,6 +18,7 @@ mod guard;
 mod lock;
 pub mod overrides;
 mod pool;
+mod provenance;
 mod report;
 mod run;
 mod schema;
@@ -30,10 +31,12 @@ use std::path::{Path, PathBuf};
 
 use crate::progress::{Progress, Silent};
 use crate::stages::prepare::Prepared;
-use crate::stages::{Plan, suggest};
+use crate::stages::write::PROGRAM;
+use crate::stages::{Invalid, Plan, suggest};
 
 pub use document::Document;
 pub use error::{Error, Place, Refusal};
+pub use provenance::Told;
 pub use report::{FileReport, Report, StageTime};
 pub use run::{RunError, run};
 pub use schema::schema;
@@ -47,6 +50,8 @@ pub struct Pipeline {
     pub plan: Plan,
     /// Where it is written.
     pub document: Document,
+    /// What its inputs must be, where that is written.
+    pub inputs: Vec<spec::InputSpec>,
 }
 
 impl Pipeline {
@@ -62,10 +67,15 @@ impl Pipeline {
             document.set(assignment)?;
         }
         let spec: spec::PipelineSpec = document.decode()?;
-        let (seed, folder) = (spec.seed.unwrap_or(0), document.folder());
+        let folder = spec.folder.iter().fold(document.folder(), |base, folder| base.join(folder));
+        let seed = spec.seed.unwrap_or(0);
         let plan = Plan::new(&spec.name, seed, &spec.stages, folder, out);
-        let plan = plan.map_err(|invalid| document.refuse(invalid))?;
-        Ok(Pipeline { plan, document })
+        let mut plan = plan.map_err(|invalid| document.refuse(invalid))?;
+        if let Some(program) = spec.program.filter(|program| program != PROGRAM) {
+            let message = format!("was written by {program}, and this is {PROGRAM}, whose files may be others");
+            plan.warnings.push(Invalid::new("program", message));
+        }
+        Ok(Pipeline { plan, document, inputs: spec.inputs.unwrap_or_default() })
     }
 
     /// Builds the scenes for which `wanted` says so, and reads the occlusion files that are loaded into them and wanted
@@ -83,6 +93,7 @@ impl Pipeline {
     /// As [`Pipeline::prepare`].
     pub fn prepare_watched(&self, wanted: impl Fn(usize) -> bool, progress: &dyn Progress) -> Result<Prepared, Error> {
         guard::check(self)?;
+        provenance::check(self)?;
         self.plan.prepare(wanted, progress).map_err(|invalid| self.document.refuse(invalid))
     }
 

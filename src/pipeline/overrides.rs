@@ -3,7 +3,8 @@
 //! It edits the tree before anything is decoded, so an override is checked as strictly as the file, and a complaint
 //! about it quotes it. KEY is a dotted path. Its first word is looked up in this order:
 //!
-//! 1. `name`, `seed` and `stages`, the pipeline's own keys (`stages[1].render.shading` reaches any stage);
+//! 1. `name`, `seed` and `stages`, the pipeline's own keys (`stages[1].render.shading` reaches any stage); `folder`,
+//!    `inputs` and `program` too, where no stage is called so;
 //! 2. a stage's `id`: `with-ao.dimensions` changes that stage;
 //! 3. a kind of stage: `occlusion.samples` changes every stage of that kind, with an id or without.
 //!
@@ -18,6 +19,9 @@ use crate::stages::KINDS;
 /// The pipeline's own keys.
 pub(super) const TOP_KEYS: [&str; 3] = ["name", "seed", "stages"];
 
+/// Those of them that files tell, and nobody needs to write.
+const RARE_KEYS: [&str; 3] = ["program", "folder", "inputs"];
+
 /// Applies one assignment to the tree. A refusal without a place is about the assignment itself.
 pub(super) fn apply(root: &mut Node, assignment: &str, origin: Origin) -> Result<(), Problem> {
     let Some((key, text)) = assignment.split_once('=') else {
@@ -28,7 +32,10 @@ pub(super) fn apply(root: &mut Node, assignment: &str, origin: Origin) -> Result
     let Some((Segment::Key(first), rest)) = path.split_first() else {
         return Err(Problem::new("the key is missing")); // parse_path gives a key first
     };
-    if TOP_KEYS.contains(&first.as_str()) {
+    // Ids may be called as these are, which are rarely set.
+    let taken =
+        |root: &Node| root.get("stages").is_some_and(|list| list.items().iter().any(|s| id_of(s) == Some(first)));
+    if TOP_KEYS.contains(&first.as_str()) || (RARE_KEYS.contains(&first.as_str()) && !taken(root)) {
         return assign(root, &path, value.as_ref(), origin);
     }
     let Some(stages) = root_stages(root) else {

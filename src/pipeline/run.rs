@@ -6,15 +6,16 @@
 //! inputs are read, scenes are worked on one by one, and figures come last.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::book::Book;
+use super::cache::MadeBy;
 use super::lock::{Busy, Lock};
 use super::report::Report;
 use super::settings::Backend;
-use super::{Error, Pipeline, Settings};
+use super::{Error, Pipeline, Settings, provenance};
 use crate::io;
 use crate::mesh::Mesh;
 use crate::occlusion::Cancelled;
@@ -89,7 +90,9 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     };
     let _lock = Lock::take(&plan.out)?;
     let keys = Keys::new(plan);
-    let mut book = Book::open(plan, &keys, settings.force);
+    let text = provenance::text(pipeline, &keys);
+    let made_by = MadeBy { told: keys.hash(&text), folder: folder(pipeline) };
+    let mut book = Book::open(plan, &keys, made_by, settings.force);
     check_resources(pipeline, &book)?;
     let running = progress.stage("scene", 0);
     let wanted = |stage| plan.scene_of(stage).is_some_and(|scene| book.needs(plan, scene));
@@ -105,11 +108,13 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     if book.anything() {
         io::check_writable(&plan.out)?;
     }
+    book.retell(plan, &text)?;
     let building = began.elapsed();
     let loaded = plan.all::<OcclusionPlan>().zip(loaded).filter_map(|((stage, _), found)| Some((stage, found?)));
     let loaded = loaded.collect();
     let force = settings.force;
-    let mut run = Schedule { pipeline, opencl, progress, book: &mut book, loaded, force, times: BTreeMap::new() };
+    let (told, times) = (&*text, BTreeMap::new());
+    let mut run = Schedule { pipeline, told, opencl, progress, book: &mut book, loaded, force, times };
     for (((scene, _), mesh), notes) in plan.all::<ScenePlan>().zip(meshes).zip(notes) {
         match mesh {
             Some(AnyMesh::Three(mesh)) => run.scene(scene, mesh, notes, building)?,
@@ -130,6 +135,13 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     Ok(report)
 }
 
+/// Where the paths of a pipeline's inputs start, as it is found from anywhere.
+fn folder(pipeline: &Pipeline) -> Option<String> {
+    let folder = &pipeline.plan.folder;
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    folder.canonicalize().ok()?.into_os_string().into_string().ok()
+}
+
 /// Refuses a run whose files don't fit on the disk, or one layer of whose pictures doesn't fit in memory.
 fn check_resources(pipeline: &Pipeline, book: &Book) -> Result<(), RunError> {
     let plan = &pipeline.plan;
@@ -148,6 +160,7 @@ fn check_resources(pipeline: &Pipeline, book: &Book) -> Result<(), RunError> {
 /// A run in progress.
 struct Schedule<'p> {
     pipeline: &'p Pipeline,
+    told: &'p str,
     opencl: Option<Arc<OpenCl>>,
     progress: &'p dyn Progress,
     book: &'p mut Book,
@@ -202,6 +215,7 @@ impl Schedule<'_> {
         let start = Instant::now();
         let mut run = Run {
             plan: &self.pipeline.plan,
+            told: self.told,
             progress: self.progress,
             ledger: self.book,
             loaded: std::mem::take(&mut self.loaded),

@@ -17,12 +17,14 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
+    use crate::pipeline::spec::InputSpec;
     use crate::pipeline::yaml;
     use crate::render::Aov;
     use crate::scene::ObjectSpec;
     use crate::stages::StageSpec;
     use crate::stages::camera::{CameraSpec, Projection};
     use crate::stages::cut::{Axis, Plane};
+    use crate::stages::mesh::MeshSpec;
     use crate::stages::occlusion::{Method, OcclusionSpec};
     use crate::stages::paraview::{ColorBy, ParaviewSpec, Reader, Style};
     use crate::stages::render::{RenderSpec, Shading};
@@ -70,6 +72,8 @@ mod tests {
             ("RenderSpec", decoder_knows::<RenderSpec>("{zzz: 1}")),
             ("CameraSpec", decoder_knows::<CameraSpec>("{zzz: 1}")),
             ("WriteSpec", decoder_knows::<WriteSpec>("{zzz: 1}")),
+            ("MeshSpec", decoder_knows::<MeshSpec>("{zzz: 1}")),
+            ("InputSpec", decoder_knows::<InputSpec>("{zzz: 1}")),
             ("ParaviewSpec", decoder_knows::<ParaviewSpec>("{zzz: 1}")),
             ("Plane", decoder_knows::<Plane>("{zzz: 1}")),
             ("Method", decoder_knows::<Method>("zzz")),

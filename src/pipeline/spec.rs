@@ -4,6 +4,8 @@
 //! what wasn't. Numbers are whatever was typed; ranges, references between stages and lengths of vectors are checked
 //! by each stage. The doc comments are what `ao4d schema` shows in an editor.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -20,4 +22,20 @@ pub struct PipelineSpec {
     pub seed: Option<u64>,
     /// What to do, in order. A stage works on the nearest earlier stage of the kind it needs, or on the one its `input` names.
     pub stages: Vec<StageSpec>,
+    /// The program that this was written by, as files tell it; another version may make other files of it.
+    pub program: Option<String>,
+    /// Where relative paths of inputs start (default the pipeline's own folder).
+    pub folder: Option<PathBuf>,
+    /// Inputs that must be what they were. One that changed is refused.
+    pub inputs: Option<Vec<InputSpec>>,
+}
+
+/// An input file, and what is in it.
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(deny_unknown_fields)]
+pub struct InputSpec {
+    /// The file, as stages name it.
+    pub file: PathBuf,
+    /// The SHA-256 of its content, in hexadecimal digits.
+    pub sha256: String,
 }

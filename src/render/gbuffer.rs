@@ -119,6 +119,10 @@ columns! {
     /// Ambient occlusion interpolated between the simplex's vertices, where the occlusion itself is found otherwise; 1
     /// where nothing is.
     interpolated INTERPOLATED: f32 = 1.0;
+    /// The occlusion that the surroundings of a voxel suggest; 1 where nothing is.
+    fitted FITTED: f32 = 1.0;
+    /// The variance of what such suggestions leave out; 0 where nothing is.
+    misfit MISFIT: f32 = 0.0;
     /// The standard error of the occlusion; 0 where nothing is.
     error ERROR: f32 = 0.0;
     /// The part of the voxel that sees something, 0 to 1.

@@ -10,6 +10,7 @@
 //! 5. [`Aov`]: the columns as the numbers of an array, for each array that somebody asked for.
 
 pub mod aov;
+mod audit;
 mod camera;
 pub mod filters;
 pub mod gbuffer;
@@ -21,6 +22,7 @@ mod surface;
 pub mod visibility;
 
 pub use aov::Aov;
+pub use audit::Accuracy;
 pub use camera::{Camera, CameraError, Projection, View};
 pub use gbuffer::{Columns, GBuffer};
 pub use renderer::{Renderer, Slab};

@@ -3,15 +3,16 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::audit::Audit;
 use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
 use super::samples::Sampling;
 use super::surface::SurfacePass;
-use super::{Aov, Camera, NOTHING, Shading, Visibility, occlude, visibility};
+use super::{Accuracy, Aov, Camera, NOTHING, Shading, Visibility, occlude, visibility};
 use crate::accel::Tracer;
 use crate::occlusion::Error;
 use crate::progress::Progress;
-use crate::trace::RayBackend;
+use crate::trace::{self, RayBackend};
 use crate::volume::{Array, Grid, Volume};
 
 /// The working set of a slab: so little that memory is used again for the next, not asked for anew.
@@ -34,6 +35,8 @@ pub struct Renderer<const D: usize> {
     pub supersample: usize,
     /// What looks at neighbouring voxels, in this order.
     pub filters: Vec<Box<dyn ImageFilter<D>>>,
+    /// The rays that some voxels are looked at again with, to measure how far off the picture is; others than its own.
+    pub audit: Option<trace::Sampling>,
 }
 
 /// Some layers of a picture.
@@ -54,7 +57,7 @@ impl<const D: usize> Renderer<D> {
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
-        Self { backend, camera, grid, shading, visibility, supersample: 1, filters: Vec::new() }
+        Self { backend, camera, grid, shading, visibility, supersample: 1, filters: Vec::new(), audit: None }
     }
 
     /// The scene.
@@ -63,7 +66,8 @@ impl<const D: usize> Renderer<D> {
     }
 
     /// Makes the picture from the first layer to the last, and hands over slab after slab with these arrays. `thickness`
-    /// is how many layers a slab has; by default as many as need little memory. No value depends on it.
+    /// is how many layers a slab has; by default as many as need little memory. No value depends on it. Returns how far off
+    /// the occlusion is, if it was asked for and any voxel sees something.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if `progress` says so, [`Error::OverBudget`] where a closed form is too expensive, and those of
@@ -74,7 +78,7 @@ impl<const D: usize> Renderer<D> {
         thickness: Option<usize>,
         progress: &dyn Progress,
         mut sink: impl FnMut(Slab) -> Result<(), E>,
-    ) -> Result<(), E> {
+    ) -> Result<Option<Accuracy>, E> {
         let depth = self.grid.dimensions[2];
         let thickness = thickness.unwrap_or_else(|| self.layers_within(SLAB_BYTES, aovs)).max(1);
         let sampling = Sampling::new(&self.camera, &self.grid, self.supersample);
@@ -99,16 +103,20 @@ impl<const D: usize> Renderer<D> {
             }
             Ok(buffer)
         };
+        let mut audit = self.audit.map(Audit::new);
         let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
         for first in (0..depth).step_by(thickness) {
             let buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
             let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
+            if let Some(audit) = &mut audit {
+                audit.add(&buffer);
+            }
             let arrays = aovs.iter().map(|aov| aov.array(&buffer)).collect();
             let is_behind = |simplex: u32| simplex != NOTHING && visibility.is_away(simplex);
             let behind = buffer.simplex.iter().filter(|&&simplex| is_behind(simplex)).count() as u64;
             sink(Slab { layers: buffer.layers(), arrays, seen, behind })?;
         }
-        Ok(())
+        Ok(audit.map(|audit| audit.finish(&*self.backend, progress)).transpose()?.flatten())
     }
 
     /// The whole picture in memory.
@@ -126,7 +134,10 @@ impl<const D: usize> Renderer<D> {
 
     /// The columns that arrays and filters need.
     fn columns(&self, aovs: &[Aov]) -> Columns {
-        columns(&self.shading, aovs) | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns())
+        let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
+        columns(&self.shading, aovs)
+            | audited
+            | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns())
     }
 
     /// Layers of a slab whose working set stays below `bytes`; at least one.

@@ -6,6 +6,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::Invalid;
 use super::range::{check_length, positive};
@@ -76,6 +77,19 @@ pub enum ProjectionPlan {
         /// The image's extent from bottom to top, above 0.
         height: f64,
     },
+}
+
+impl CameraPlan {
+    /// As it is written in a pipeline, nothing left out.
+    pub(super) fn written(&self) -> Value {
+        let (word, key, number) = match self.projection {
+            ProjectionPlan::Perspective { field_of_view } => (Projection::Perspective, "field_of_view", field_of_view),
+            ProjectionPlan::Parallel { height } => (Projection::Parallel, "height", height),
+        };
+        json!({
+            "projection": word, key: number, "eye": self.eye, "target": self.target, "up": self.up, "over": self.over
+        })
+    }
 }
 
 /// Checks a camera of a scene of this dimension, written at `path`. Keys without a use in it go into `warnings`.

@@ -43,8 +43,10 @@ pub struct Output {
     pub file: PathBuf,
     /// Files without which it is of no use, and which are made with it.
     pub beside: Vec<PathBuf>,
-    /// What decides its bytes.
+    /// What decides its bytes, but for what it tells of the pipeline as a whole.
     pub key: String,
+    /// Which of these files tells of the pipeline as a whole, if one does.
+    pub tells: Option<PathBuf>,
 }
 
 /// A file changed within this time before it was hashed may change again without its times telling.
@@ -102,6 +104,11 @@ impl Inputs {
         known.as_ref().map(|hashed| hashed.hash.clone())
     }
 
+    /// The files that there are, each with the SHA-256 of its content.
+    pub fn hashes(&self) -> impl Iterator<Item = (&Path, &str)> {
+        self.files.iter().filter_map(|(path, known)| Some((path.as_path(), known.as_ref()?.hash.as_str())))
+    }
+
     /// The first file that is no longer what was hashed.
     pub fn changed(&self) -> Option<&Path> {
         let same = |path: &Path, known: &Option<Hashed>| match (known, std::fs::metadata(path)) {
@@ -116,6 +123,11 @@ impl Inputs {
         };
         self.files.iter().find(|(path, known)| !same(path, known)).map(|(path, _)| path.as_path())
     }
+}
+
+/// The SHA-256 of a regular file's content, in hexadecimal digits; none if it can't be read whole, or changes meanwhile.
+pub fn sha256(path: &Path) -> Option<String> {
+    hash_file(path).map(|hashed| hashed.hash)
 }
 
 /// The content of a regular file, hashed; none if it can't be read whole, or changes meanwhile.
@@ -151,7 +163,7 @@ pub struct Keys {
     /// Of each stage as a whole.
     stages: Vec<String>,
     inputs: Inputs,
-    /// What images tell of the pipeline as a whole.
+    /// What decides that part of the bytes of images which is neither seen nor told by every file alike.
     provenance: String,
 }
 
@@ -187,7 +199,7 @@ impl Keys {
         &self.stages[index]
     }
 
-    /// What images tell of the pipeline as a whole: its name and seed.
+    /// What the settings that images tell depend on beside their stages: the pipeline's name and seed.
     pub fn provenance(&self) -> &str {
         &self.provenance
     }

@@ -1,4 +1,4 @@
-//! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`.
+//! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`, `mesh`.
 //!
 //! A stage's file holds all there is to know of it: what is written in YAML (its `Spec`), what is understood of that
 //! (its `Plan`: checked, resolved, every default filled in), its part of the key that tells whether a file is fresh, its
@@ -14,6 +14,7 @@
 //! - a `render` works on a scene, and is darkened by an occlusion of that scene. Named by `input` or `occlusion`, or
 //!   the nearest earlier of each. If these two don't belong together, the plan asks instead of guessing;
 //! - a `write` works on a render;
+//! - a `mesh` works on a scene, and has the values of an occlusion of that scene, found as a render finds them;
 //! - a `paraview` figure works on writes, and finds them also by the name of their render.
 
 pub mod camera;
@@ -21,6 +22,7 @@ pub mod cut;
 pub mod describe;
 mod error;
 pub mod key;
+pub mod mesh;
 mod names;
 pub mod occlusion;
 mod one_or_many;
@@ -40,6 +42,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+
+use crate::io;
 
 pub use describe::{Counts, Totals};
 pub use error::{Invalid, StageError};
@@ -90,6 +94,11 @@ pub trait Stage: plan::OfKind + Serialize {
         Vec::new()
     }
 
+    /// Whether it shows the values of the occlusion at this place at every vertex, seen or not.
+    fn wants_values(&self, _occlusion: usize) -> bool {
+        false
+    }
+
     /// What else decides its result, beside its own fields, what it works on, and the files it reads.
     fn depends_on(_me: Ref<Self>, _plan: &Plan) -> Value {
         Value::Null
@@ -108,6 +117,21 @@ pub trait Stage: plan::OfKind + Serialize {
     /// The files that it leaves and the cache knows, each with its key.
     fn outputs(_me: Ref<Self>, _plan: &Plan, _keys: &Keys) -> Vec<Output> {
         Vec::new()
+    }
+
+    /// Puts another text in the place of the one that a file of its outputs tells of the pipeline; the rest of the file
+    /// stays as it is. Returns the file's length.
+    ///
+    /// # Errors
+    /// If the file is none of this stage's, or can't be written.
+    fn retell(_me: Ref<Self>, _plan: &Plan, _output: &Path, _text: &str) -> Result<u64, io::Error> {
+        Ok(0)
+    }
+
+    /// What is understood of it beyond what is written, in the form of what is written. A pipeline that a file tells has
+    /// these in the place of what was left out, so that it is still the same when a default becomes another.
+    fn written(_me: Ref<Self>, _plan: &Plan) -> Value {
+        Value::Null
     }
 
     /// The memory that it takes at once and the bytes that it leaves, given which files have to be made.
@@ -219,6 +243,10 @@ macro_rules! stages {
                 match &self.stages[index].plan { $(StagePlan::$name(plan) => plan.input_files(self)),+ }
             }
 
+            pub fn wants_values(&self, index: usize, occlusion: usize) -> bool {
+                match &self.stages[index].plan { $(StagePlan::$name(plan) => plan.wants_values(occlusion)),+ }
+            }
+
             fn depends_on(&self, index: usize) -> Value {
                 match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::depends_on(self.at(index), self)),+ }
             }
@@ -233,6 +261,14 @@ macro_rules! stages {
 
             pub fn outputs(&self, index: usize, keys: &Keys) -> Vec<Output> {
                 match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::outputs(self.at(index), self, keys)),+ }
+            }
+
+            pub fn retell(&self, index: usize, output: &Path, text: &str) -> Result<u64, io::Error> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::retell(self.at(index), self, output, text)),+ }
+            }
+
+            pub fn written(&self, index: usize) -> Value {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::written(self.at(index), self)),+ }
             }
 
             pub fn needs(&self, index: usize, stale: &dyn Fn(&Path) -> bool) -> Needs {
@@ -290,4 +326,6 @@ stages! {
     Write: write::WriteSpec => write::WritePlan;
     /// A ParaView state that shows images.
     Paraview: paraview::ParaviewSpec => paraview::FigurePlan;
+    /// A scene's mesh as it is, without a camera.
+    Mesh: mesh::MeshSpec => mesh::MeshPlan;
 }

@@ -20,6 +20,7 @@ use super::render::{self, RenderPlan};
 use super::scene::{MISSING, ScenePlan};
 use super::write::{self, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use crate::geometry::Dimension;
 use crate::io;
 use crate::occlusion::exact::{self, Budget};
 use crate::occlusion::{self, Deviations, Estimates, Estimator, ProgramDeviations, Sidecar};
@@ -75,7 +76,7 @@ pub enum Method {
     Adaptive,
     /// In closed form, without sampling noise.
     Exact,
-    /// As the thesis published it, slips and all, for its figures.
+    /// As the thesis published it, with its deviations from the definition, for its figures.
     AsPublished,
     /// As the thesis's program did it, which is not what its text says, for its figures.
     AsProgrammed,
@@ -188,7 +189,8 @@ impl Stage for OcclusionPlan {
     }
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
-        let used = plan.all::<RenderPlan>().any(|(_, render)| render.occlusion == Some(me));
+        let shown = plan.all::<RenderPlan>().any(|(_, render)| render.occlusion == Some(me));
+        let used = shown || (0..plan.stages.len()).any(|stage| plan.wants_values(stage, me.index()));
         (!used && plan[me].file.is_none()).then_some("no render uses this occlusion and no `file` keeps it")
     }
 
@@ -218,7 +220,26 @@ impl Stage for OcclusionPlan {
     fn outputs(me: Ref<Self>, plan: &Plan, keys: &Keys) -> Vec<Output> {
         let Some(file) = &plan[me].file else { return Vec::new() };
         let beside = std::iter::once(sidecar_path(file)).chain(plan[me].errors_file()).collect();
-        vec![Output { file: file.clone(), beside, key: keys.of(me.index()).to_owned() }]
+        let (key, tells) = (keys.of(me.index()).to_owned(), Some(sidecar_path(file)));
+        vec![Output { file: file.clone(), beside, key, tells }]
+    }
+
+    fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
+        let path = plan.out.join(sidecar_path(output));
+        let failed = |cause| io::Error::File { path: path.clone(), action: "be read", cause };
+        let known = crate::input::read_text(&path).map_err(failed)?;
+        let sidecar = Sidecar::from_yaml(&known).map_err(|e| failed(std::io::Error::other(e.to_string())))?;
+        write_whole(&path, Sidecar { pipeline: Some(text.to_owned()), ..sidecar }.to_yaml().as_bytes())
+    }
+
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let OcclusionSource::Compute(computation) = &plan[me].source else { return Value::Null };
+        let method = computation.method;
+        match computation.samples {
+            Samples::Exact => json!({ "method": method, "max_cones": computation.max_cones }),
+            Samples::Fixed(samples) => json!({ "method": method, "samples": samples }),
+            Samples::Target { max_samples, .. } => json!({ "method": method, "max_samples": max_samples }),
+        }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String {
@@ -265,6 +286,7 @@ impl Stage for OcclusionPlan {
             (OcclusionSource::Load(_), Some(loaded)) => loaded.sidecar.clone(),
             (OcclusionSource::Load(_), None) => return Ok(String::new()),
         };
+        let sidecar = Sidecar { pipeline: Some(run.told.to_owned()), ..sidecar };
         // The values last: they are what others look for.
         let _together = io::together();
         match plan[me].errors_file() {
@@ -383,7 +405,9 @@ fn mask<const D: usize>(
     let shown = plan.all::<WritePlan>().any(|(_, write)| {
         plan[write.render].occlusion == Some(me) && !write.stale(write::Content::Mesh, &|f| run.is_stale(f)).is_empty()
     });
-    if shown || plan[me].file.is_some() {
+    let stale = |stage: usize| plan.files_of(stage).into_iter().any(|file| run.is_stale(file));
+    let whole = (0..plan.stages.len()).any(|stage| plan.wants_values(stage, me.index()) && stale(stage));
+    if shown || whole || plan[me].file.is_some() {
         return Ok(None);
     }
     let mut left = computation.most_rays().saturating_mul(scene.session.mesh().vertices.len() as u64) / 4;
@@ -498,42 +522,75 @@ impl Method {
         }
     }
 
+    /// Whether its values are those of rays, and nothing else.
+    pub fn is_by_rays(self) -> bool {
+        matches!(self, Method::Sobol | Method::Random | Method::Adaptive)
+    }
+
     /// Whether it is there for the thesis's figures alone.
     pub fn is_of_the_thesis(self) -> bool {
         matches!(self, Method::AsPublished | Method::AsProgrammed)
     }
 }
 
+/// Rays that a voxel is looked at again with, to measure pictures,
+const AUDIT_RAYS: u32 = 256;
+/// none of which are a picture's own.
+const AUDIT_SEED: u64 = 0x5851_f42d_4c95_7f2d;
+
 impl OcclusionPlan {
-    /// What computes the occlusion of voxels beside that of vertices, for `shading: auto`: a sixteenth of a vertex's rays,
-    /// from 4 to 16, by the same sampler. None where rays are no way to the same values: of a file nobody knows how it came
-    /// about, and the thesis's methods have values at vertices only.
-    pub fn at_voxels(&self) -> Option<Estimator> {
+    /// The rays that a voxel takes beside the vertices' values, for `shading: auto`: so few that what is left of their noise
+    /// among the neighbours is well below the tolerance, by the same sampler, and no more than a vertex takes. None where
+    /// rays are no way to the same values: of a file nobody knows how it came about, and the thesis's methods have values
+    /// at vertices only.
+    pub fn at_voxels(&self, dimension: Dimension, tolerance: f64) -> Option<Sampling> {
+        let most = self.most_at_voxels()?;
+        let noise = |samples: u32| Sampling { samples, ..most }.expected_variance(dimension, 0.5).sqrt();
+        let enough = |samples: &u32| noise(*samples) * dimension.pick(0.07, 0.1) <= 0.75 * tolerance;
+        let samples = (2..).map(|n| 1 << n).find(|n| *n >= most.samples || enough(n)).unwrap_or(most.samples);
+        Some(Sampling { samples: samples.min(most.samples), ..most })
+    }
+
+    /// The most rays that a voxel takes, for `shading: auto`: as many as a vertex.
+    pub fn most_at_voxels(&self) -> Option<Sampling> {
         let OcclusionSource::Compute(computation) = &self.source else { return None };
         let most = match computation.samples {
-            Samples::Fixed(samples) => samples,
+            Samples::Fixed(samples) => u32::try_from(samples).unwrap_or(u32::MAX),
             Samples::Target { .. } | Samples::Exact => 256,
         };
         let sampling = Sampling {
             sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
-            samples: (most / 16).clamp(4, 16) as u32,
+            samples: most,
             seed: computation.seed,
             max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
             target: None,
         };
-        (!computation.method.is_of_the_thesis()).then_some(Estimator::Sampled(sampling))
+        (!computation.method.is_of_the_thesis()).then_some(sampling)
     }
 
-    /// How many rays a voxel takes with this shading; none where it takes none, or as many as it needs.
-    pub fn rays_per_voxel(&self, shading: render::Shading) -> Option<u32> {
-        let estimator = match (shading, &self.source) {
-            (render::Shading::Auto, _) => self.at_voxels()?,
-            (render::Shading::Voxel, OcclusionSource::Compute(computation)) => computation.estimator(),
-            _ => return None,
-        };
-        match estimator {
-            Estimator::Sampled(sampling) if sampling.target.is_none() => Some(sampling.samples),
+    /// Rays to measure pictures by: what this occlusion is meant to be, whatever its method. None for a file nobody knows
+    /// how it came about.
+    pub fn audit(&self) -> Option<Sampling> {
+        let OcclusionSource::Compute(computation) = &self.source else { return None };
+        let max_distance = computation.max_distance.map_or(f32::INFINITY, |d| d as f32);
+        Some(Sampling { max_distance, ..Sampling::new(AUDIT_RAYS, computation.seed ^ AUDIT_SEED) })
+    }
+
+    /// The rays that each voxel takes, if that is a fixed number of rays, for `shading: voxel`.
+    pub fn instead_of_vertices(&self) -> Option<Sampling> {
+        let OcclusionSource::Compute(computation) = &self.source else { return None };
+        match computation.estimator() {
+            Estimator::Sampled(sampling) if sampling.target.is_none() => Some(sampling),
             _ => None,
+        }
+    }
+
+    /// Where visible points have their occlusion from, unless it is said: from vertices and rays, or from vertices alone
+    /// if their values are not made by rays.
+    pub fn default_shading(&self) -> render::Shading {
+        match &self.source {
+            OcclusionSource::Compute(computation) if computation.method.is_by_rays() => render::Shading::Auto,
+            _ => render::Shading::Smooth,
         }
     }
 }
@@ -595,5 +652,6 @@ fn sidecar(found: &Estimates, computation: &Computation, mesh_hash: &str) -> Sid
         error_estimate: found.error(),
         mesh: mesh_hash.to_owned(),
         program: PROGRAM.to_owned(),
+        pipeline: None,
     }
 }

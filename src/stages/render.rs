@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
@@ -18,14 +19,20 @@ use super::scene::{MISSING, ScenePlan};
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::geometry::Dimension;
-use crate::render::filters::{Denoise, Dilate, ImageFilter};
+use crate::occlusion::Estimator;
+use crate::render::filters::denoise::Refine;
+use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
+use crate::render::{self, Accuracy, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
+use crate::text::number;
+use crate::trace::Sampling;
 
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
 /// The most layers of empty voxels that take over values.
 const MAX_DILATION: usize = 16;
+/// The standard error that a voxel may have, unless it is said otherwise.
+const TOLERANCE: f64 = 0.01;
 /// Voxels of fewer rays are denoised, unless it is said otherwise.
 const DENOISED_BELOW: u32 = 64;
 /// The working set of a slab: so little that memory is used again for the next, not asked for anew.
@@ -45,11 +52,14 @@ pub struct RenderSpec {
     pub camera: Option<CameraSpec>,
     /// Voxels along x, y and z; in 3D pixels along x and y.
     pub dimensions: Vec<u64>,
-    /// Where the occlusion of a visible point comes from (default `smooth`).
+    /// Where the occlusion of a visible point comes from (default `auto` where it is computed by rays, else `smooth`).
     pub shading: Option<Shading>,
     /// Whether the occlusion of voxels is denoised by that of their neighbours; with `voxel` (default: below 64 rays) and
     /// `auto` (always).
     pub denoise: Option<bool>,
+    /// With `auto`: the standard error of ambient occlusion that a voxel may have (default 0.01). Where it is larger, more
+    /// rays are asked, as many as a vertex takes at most.
+    pub tolerance: Option<f64>,
     /// Samples of a voxel along each axis; opacity, colour, occlusion and depth are means over those that see something
     /// (default 1).
     #[schemars(range(min = 1, max = 8))]
@@ -73,7 +83,8 @@ pub enum Shading {
     Flat,
     /// Computed at the visible point itself: the reference for the others.
     Voxel,
-    /// Interpolated, and mended by few rays at each voxel, denoised: right where surfaces touch, too.
+    /// Interpolated, and mended by rays at each voxel: few, denoised, and more where those are not enough to keep to the
+    /// tolerance.
     Auto,
 }
 
@@ -92,6 +103,8 @@ pub struct RenderPlan {
     pub shading: Shading,
     /// Whether it is denoised.
     pub denoise: bool,
+    /// With `auto`: the standard error that a voxel may have.
+    pub tolerance: Option<f64>,
     /// Samples of a voxel along each axis.
     pub supersample: usize,
     /// Layers of empty voxels that take over bodies' values.
@@ -125,13 +138,15 @@ impl Stage for RenderPlan {
     }
 
     fn resolve(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let (scene, occlusion) = scene_and_occlusion(resolver, path, spec)?;
+        let (input, named) = (spec.input.as_deref(), spec.occlusion.as_deref());
+        let (scene, occlusion) = scene_and_occlusion(resolver, path, input, named)?;
         let dimension = resolver.plan[scene].dimension;
         let blank = CameraSpec::default();
         let camera_spec = spec.camera.as_ref().unwrap_or(&blank);
         let warnings = &mut resolver.plan.warnings;
         let camera = camera::plan(camera_spec, &format!("{path}.camera"), dimension, warnings)?;
-        let shading = spec.shading.unwrap_or_default();
+        let default = occlusion.map_or(Shading::Smooth, |o| resolver.plan[o].default_shading());
+        let shading = spec.shading.unwrap_or(default);
         let refusal = match occlusion.map(|o| &resolver.plan[o].source).filter(|_| shading == Shading::Voxel) {
             Some(OcclusionSource::Load(_)) => Some(
                 "`voxel` computes occlusion at the visible points, which a loaded file has no values for".to_owned(),
@@ -150,7 +165,8 @@ impl Stage for RenderPlan {
         }
         let dimensions = dimensions(&format!("{path}.dimensions"), &spec.dimensions, dimension)?;
         let visibility = spec.visibility.unwrap_or_default();
-        let rays = occlusion.and_then(|o| resolver.plan[o].rays_per_voxel(shading));
+        let tolerance = tolerance(&format!("{path}.tolerance"), spec.tolerance)?;
+        let rays = occlusion.and_then(|o| rays(&resolver.plan[o], shading, dimension, tolerance));
         if spec.denoise == Some(true) && rays.is_none() {
             resolver
                 .warn(format!("{path}.denoise"), "has no effect but where rays are taken at voxels: `voxel` or `auto`");
@@ -160,7 +176,10 @@ impl Stage for RenderPlan {
                 "`auto` takes so few rays at a voxel that they must be denoised; leave this out, or take `voxel`";
             return Err(Invalid::new(format!("{path}.denoise"), message));
         }
-        let few = rays.is_some_and(|rays| shading == Shading::Auto || rays < DENOISED_BELOW);
+        if spec.tolerance.is_some() && (shading != Shading::Auto || rays.is_none()) {
+            resolver.warn(format!("{path}.tolerance"), "has no effect but with `shading: auto`");
+        }
+        let few = rays.is_some_and(|rays| shading == Shading::Auto || rays.samples < DENOISED_BELOW);
         let denoise = rays.is_some() && spec.denoise.unwrap_or(few);
         let within = |key: &str, found: Option<u64>, default: usize, least: usize, most: usize| match found {
             None => Ok(default),
@@ -176,7 +195,20 @@ impl Stage for RenderPlan {
         let layers = if dimension == Dimension::Four { 3 } else { 0 };
         let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
         let arrays = Vec::new();
-        Ok(Self { scene, occlusion, camera, dimensions, shading, denoise, supersample, dilate, visibility, arrays })
+        let tolerance = (shading == Shading::Auto && denoise).then_some(tolerance);
+        Ok(Self {
+            scene,
+            occlusion,
+            camera,
+            dimensions,
+            shading,
+            denoise,
+            tolerance,
+            supersample,
+            dilate,
+            visibility,
+            arrays,
+        })
     }
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
@@ -190,6 +222,22 @@ impl Stage for RenderPlan {
 
     fn scene(me: Ref<Self>, plan: &Plan) -> Option<Ref<ScenePlan>> {
         Some(plan[me].scene)
+    }
+
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let render = &plan[me];
+        let mut written = json!({
+            "camera": render.camera.written(),
+            "shading": render.shading,
+            "supersample": render.supersample,
+            "dilate": render.dilate,
+        });
+        // Elsewhere it has no effect, and would be warned of.
+        if rays_of(plan, render).is_some() {
+            written["denoise"] = render.denoise.into();
+            written["tolerance"] = render.tolerance.into();
+        }
+        written
     }
 
     /// The memory of a slab of one layer: what is seen, its shade, and the arrays of the files that have to be made.
@@ -208,7 +256,8 @@ impl Stage for RenderPlan {
         let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
         if render.denoise {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
-            halo += 6;
+            columns |= Columns::FITTED | Columns::MISFIT | Columns::ERROR;
+            halo += 10;
         }
         let samples = (render.supersample.pow(axes) * size_of::<u32>()) as u64;
         // Filters keep the layers that they look at.
@@ -254,14 +303,15 @@ impl Stage for RenderPlan {
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
         picture.filters = filters(plan, render, &picture);
+        picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
-        let mut files = PictureFiles::create(me, plan, &|file| run.is_stale(file), &picture.grid, hash)?;
+        let mut files = PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), &picture.grid, hash)?;
         let aovs = files.aovs().to_vec();
         let (mut seen, mut behind) = (0, 0);
         // Two passes over the voxels: what is seen, and its shade.
         let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
-        picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
+        let accuracy = picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;
             behind += slab.behind;
             Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
@@ -283,8 +333,11 @@ impl Stage for RenderPlan {
             run.made(&file, bytes, notes.clone())?;
         }
         let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
+        let off = accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
+            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
+        });
         Ok(format!(
-            "{} of {} voxels see something, {rate:.2} million voxels a second",
+            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
             grouped(seen),
             grouped(render.voxels())
         ))
@@ -348,25 +401,58 @@ fn shading<const D: usize>(plan: &Plan, render: &RenderPlan, scene: &SceneRun<D>
         (Shading::Flat, _) => render::Shading::Flat(Arc::clone(&scene.values[&occlusion])),
         (Shading::Auto, _) if render.denoise => {
             let values = Arc::clone(&scene.values[&occlusion]);
-            plan[occlusion].at_voxels().map_or(render::Shading::Smooth(Arc::clone(&values)), |estimator| {
-                render::Shading::Auto(values, estimator)
-            })
+            match rays_of(plan, render) {
+                Some(sampling) => render::Shading::Auto(values, Estimator::Sampled(sampling)),
+                None => render::Shading::Smooth(values),
+            }
         }
         _ => render::Shading::Smooth(Arc::clone(&scene.values[&occlusion])),
+    }
+}
+
+/// The rays that each voxel takes with this shading; none where it takes none, or as many as it needs.
+fn rays(occlusion: &OcclusionPlan, shading: Shading, dimension: Dimension, tolerance: f64) -> Option<Sampling> {
+    match shading {
+        Shading::Auto => occlusion.at_voxels(dimension, tolerance),
+        Shading::Voxel => occlusion.instead_of_vertices(),
+        Shading::Smooth | Shading::Flat => None,
+    }
+}
+
+/// The rays that each voxel of a render takes.
+fn rays_of(plan: &Plan, render: &RenderPlan) -> Option<Sampling> {
+    let tolerance = render.tolerance.unwrap_or(TOLERANCE);
+    rays(&plan[render.occlusion?], render.shading, plan[render.scene].dimension, tolerance)
+}
+
+/// The standard error that a voxel may have.
+fn tolerance(path: &str, given: Option<f64>) -> Result<f64, Invalid> {
+    match given {
+        None => Ok(TOLERANCE),
+        Some(t) if t > 0.0 && t < 1.0 => Ok(t),
+        Some(t) => Err(Invalid::new(path, format!("expected an error above 0 and below 1, found {}", number(t)))),
     }
 }
 
 /// What looks at neighbouring voxels, in this order.
 fn filters<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<D>) -> Vec<Box<dyn ImageFilter<D>>> {
     let mut filters: Vec<Box<dyn ImageFilter<D>>> = Vec::new();
-    let rays = render.occlusion.and_then(|occlusion| plan[occlusion].rays_per_voxel(render.shading));
-    if let Some(rays) = rays.filter(|_| render.denoise) {
-        filters.push(Box::new(Denoise::new(&picture.camera, &picture.grid, rays)));
+    if let Some(sampling) = rays_of(plan, render).filter(|_| render.denoise) {
+        filters.extend(denoise(&picture.camera, &picture.grid, sampling));
+    }
+    let most = render.occlusion.and_then(|occlusion| plan[occlusion].most_at_voxels());
+    if let (Some(tolerance), Some(most)) = (render.tolerance, most) {
+        filters.push(Box::new(Refine::new(Arc::clone(&picture.backend), most, tolerance)));
     }
     if render.dilate > 0 {
         filters.push(Box::new(Dilate { layers: render.dilate }));
     }
     filters
+}
+
+/// An error to two digits, as far as there are four places.
+fn short(error: f64) -> String {
+    if error < 5e-5 { "less than 0.0001".to_owned() } else { format!("{error:.4}") }
 }
 
 /// Why a picture shows nothing.
@@ -394,18 +480,19 @@ impl Shading {
 
 /// What a render shows, and what darkens it. Named keys decide; what they leave open is the nearest earlier one; and
 /// an occlusion of another scene is refused.
-fn scene_and_occlusion(
+pub(super) fn scene_and_occlusion(
     resolver: &Resolver,
     path: &str,
-    spec: &RenderSpec,
+    input: Option<&str>,
+    occlusion: Option<&str>,
 ) -> Result<(Ref<ScenePlan>, Option<Ref<OcclusionPlan>>), Invalid> {
     let plan = &resolver.plan;
     let (mut of_scene, mut of_occlusion) = (None, None);
-    if let Some(name) = &spec.input {
+    if let Some(name) = input {
         let input = resolver.lookup(&format!("{path}.input"), name, &[ScenePlan::KIND, OcclusionPlan::KIND])?;
         (of_scene, of_occlusion) = (plan.reference::<ScenePlan>(input), plan.reference::<OcclusionPlan>(input));
     }
-    let named: Option<Ref<OcclusionPlan>> = match spec.occlusion.as_deref() {
+    let named: Option<Ref<OcclusionPlan>> = match occlusion {
         None | Some("none") => None,
         Some(name) => plan.reference(resolver.lookup(&format!("{path}.occlusion"), name, &[OcclusionPlan::KIND])?),
     };
@@ -427,7 +514,7 @@ fn scene_and_occlusion(
         }
         return Ok((scene, named));
     }
-    if spec.occlusion.is_some() {
+    if occlusion.is_some() {
         return Ok((scene, None));
     }
     if of_occlusion.is_some() {

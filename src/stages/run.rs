@@ -50,6 +50,8 @@ pub struct Made<'a> {
 pub struct Run<'p> {
     /// What is to be done.
     pub plan: &'p Plan,
+    /// The pipeline as a text, which files tell.
+    pub told: &'p str,
     /// Who watches.
     pub progress: &'p dyn Progress,
     /// The book of files.

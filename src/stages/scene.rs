@@ -95,6 +95,11 @@ impl Stage for ScenePlan {
         shapes.flat_map(|shape| shape.input_files(&plan.folder)).collect()
     }
 
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let Self { dimension, objects, .. } = &plan[me];
+        json!({ "dimension": dimension.get(), "objects": objects })
+    }
+
     fn depends_on(me: Ref<Self>, plan: &Plan) -> Value {
         let faces_eye = plan[me].objects.iter().any(|object| object.orientation == scene::Orientation::Eye);
         // The first camera matters to what is turned to face it, and to nothing else.

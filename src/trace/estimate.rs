@@ -4,20 +4,26 @@
 //! of all, with no assumption about how the integrand behaves:
 //!
 //! ```text
-//! error^2 = 1/R * 1/(R - 1) * sum over groups (mean of the group - mean of all)^2         R = 8 to 15
+//! error^2 = R^(-1/d) * 1/R * 1/(R - 1) * sum over groups (mean of the group - mean of all)^2         R = 8 to 15
 //! ```
 //!
 //! A group is a run of 2^k rays of the [`Sequence`](super::Sequence), each an evenly spread point set under an Owen
 //! scrambling that is uniformly random by itself. So every group alone has the variance of an independently scrambled set
-//! of its size. Together the groups are one larger set, spread more evenly still: what one leaves out the others
-//! cover, their errors cancel in part, and the estimate is on the safe side. With R independent sets instead, the
-//! estimate would be the same number, but the error itself larger, measured 1.3 to 1.5 times at 256 rays: the values
-//! would be made worse for the sake of their error bars. Of independent rays each is a group of its own.
+//! of its size, and R independent ones have 1/R of it. But together the groups are one larger set, spread more evenly
+//! still: what one leaves out the others cover, and their errors cancel in part. The variance of N even points of a
+//! d-dimensional hemisphere falls like N^(-1 - 1/d) ([`Sampling::expected_variance`](super::Sampling::expected_variance)),
+//! so that of R times as many is R^(-1/d) less than that of R independent sets: the first factor. With independent
+//! sets that factor would be 1, and the error itself larger, measured 1.3 to 1.5 times at 256 rays: the values would be
+//! made worse for the sake of their error bars. Of independent rays each is a group of its own.
 //!
-//! Where all groups agree there is no scatter, and yet no certainty. No ray out of N going the other way means, at 95 %,
-//! a share below 3/N (the rule of three), which are two standard errors of 1.5/N. No estimate is below that.
+//! Few groups scatter less than they should now and then, and where all agree there is no scatter, and yet no certainty. So
+//! no estimate is below what is to be expected of so many even rays at a place of that value, half a ray the other way
+//! added: about 0.5/N where all agree. Of independent rays, none out of N going the other way means, at 95 %, a share below
+//! 3/N (the rule of three), which are two standard errors of 1.5/N: no estimate is below that.
 
+use super::noise;
 use super::sampling::{Sampler, Target};
+use crate::geometry::Dimension;
 
 /// Groups there are, once as many rays are known.
 const LEAST_GROUPS: usize = 8;
@@ -66,14 +72,15 @@ pub(crate) struct Accumulator {
     /// Rays of the unfinished group, and how many of them escape.
     begun: u32,
     open: u32,
-    /// Whether rays know nothing of each other.
-    independent: bool,
+    /// In what space rays are even; none if they know nothing of each other.
+    even_in: Option<Dimension>,
 }
 
 impl Accumulator {
-    pub fn new(sampler: Sampler) -> Self {
-        let independent = sampler == Sampler::Random;
-        Self { groups: [0; 2 * LEAST_GROUPS], finished: 0, size: 1, begun: 0, open: 0, independent }
+    /// For rays of this sampler in a space of this dimension.
+    pub fn new(sampler: Sampler, dimension: Dimension) -> Self {
+        let even_in = (sampler == Sampler::Sobol).then_some(dimension);
+        Self { groups: [0; 2 * LEAST_GROUPS], finished: 0, size: 1, begun: 0, open: 0, even_in }
     }
 
     /// Whether the order of the next 64 rays matters: groups are smaller than that.
@@ -121,8 +128,21 @@ impl Accumulator {
 
     /// The standard error, at most 1.
     pub fn error(&self) -> f64 {
-        let variance = if self.independent { self.variance_of_rays() } else { self.variance_of_groups() };
-        variance.sqrt().max(bound(self.rays())).min(1.0)
+        let rays = f64::from(self.rays());
+        let variance = match self.even_in {
+            None => self.variance_of_rays().max(bound(self.rays()).powi(2)),
+            Some(dimension) => {
+                let groups = self.variance_of_groups() * libm::pow(self.groups(), -1.0 / dimension.pick(2.0, 3.0));
+                let value = (f64::from(self.escaped()) + 0.5) / (rays + 1.0);
+                groups.max(noise::of_even_rays(dimension, value, rays))
+            }
+        };
+        variance.sqrt().min(1.0)
+    }
+
+    /// How many groups there are, the unfinished one in part.
+    fn groups(&self) -> f64 {
+        f64::from(self.rays()) / f64::from(self.size)
     }
 
     fn variance_of_rays(&self) -> f64 {
@@ -150,7 +170,7 @@ impl Accumulator {
     }
 }
 
-/// What no estimate of so many rays is below.
+/// What no estimate of so many independent rays is below.
 fn bound(rays: u32) -> f64 {
     1.5 / f64::from(rays)
 }
@@ -160,7 +180,7 @@ mod tests {
     use super::*;
 
     fn accumulator(rays: &[bool]) -> Accumulator {
-        let mut accumulator = Accumulator::new(Sampler::Sobol);
+        let mut accumulator = Accumulator::new(Sampler::Sobol, Dimension::Four);
         rays.iter().for_each(|&ray| accumulator.add(u64::from(ray), 1));
         accumulator
     }
@@ -189,7 +209,10 @@ mod tests {
             assert!((2..16).contains(&means.len()));
             let mean = means.iter().sum::<f64>() / n;
             let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
-            let expected = (variance * n * size as f64 / f64::from(count)).sqrt().max(1.5 / f64::from(count));
+            let groups = f64::from(count) / size as f64;
+            let expected = (variance * n / groups).sqrt() * groups.powf(-1.0 / 6.0);
+            let value = (f64::from(found.escaped()) + 0.5) / f64::from(count + 1);
+            let expected = expected.max(noise::of_even_rays(Dimension::Four, value, count.into()).sqrt());
             assert!((found.error() - expected.min(1.0)).abs() < 1e-12, "{count}: {} {expected}", found.error());
         }
     }
@@ -197,7 +220,7 @@ mod tests {
     #[test]
     fn independent_rays_are_groups_of_their_own() {
         let rays = pattern(300);
-        let mut accumulator = Accumulator::new(Sampler::Random);
+        let mut accumulator = Accumulator::new(Sampler::Random, Dimension::Four);
         rays.iter().for_each(|&ray| accumulator.add(u64::from(ray), 1));
         let share = rays.iter().filter(|&&r| r).count() as f64 / 300.0;
         assert!((accumulator.error() - (share * (1.0 - share) / 299.0).sqrt()).abs() < 1e-12);
@@ -206,7 +229,7 @@ mod tests {
     #[test]
     fn words_count_like_single_rays() {
         let rays = pattern(64 * 40);
-        let mut words = Accumulator::new(Sampler::Sobol);
+        let mut words = Accumulator::new(Sampler::Sobol, Dimension::Four);
         for (n, word) in rays.chunks(64).enumerate() {
             words.add(word.iter().rev().fold(0, |w, &r| w << 1 | u64::from(r)), 64);
             let single = accumulator(&rays[..64 * (n + 1)]);
@@ -219,11 +242,14 @@ mod tests {
     fn agreement_is_not_certainty() {
         for all in [true, false] {
             for count in [1u32, 5, 64, 100, 1 << 20] {
-                let mut accumulator = Accumulator::new(Sampler::Sobol);
-                (0..count).for_each(|_| accumulator.add(u64::from(all), 1));
-                let estimate = accumulator.estimate();
-                assert_eq!(estimate.value, f32::from(u8::from(all)));
-                assert_eq!(estimate.error, (1.5 / f64::from(count)).min(1.0) as f32);
+                for (sampler, least) in [(Sampler::Sobol, 0.4f64), (Sampler::Random, 1.5)] {
+                    let mut accumulator = Accumulator::new(sampler, Dimension::Four);
+                    (0..count).for_each(|_| accumulator.add(u64::from(all), 1));
+                    let estimate = accumulator.estimate();
+                    assert_eq!(estimate.value, f32::from(u8::from(all)));
+                    let rays = f64::from(estimate.error) * f64::from(count);
+                    assert!((least.min(f64::from(count))..1.5 * least).contains(&(rays + 1e-6)), "{count}: {rays}");
+                }
             }
         }
     }

@@ -14,6 +14,7 @@
 mod backend;
 pub mod cpu;
 mod estimate;
+mod noise;
 pub mod opencl;
 mod point;
 mod sampling;

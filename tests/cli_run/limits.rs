@@ -72,7 +72,7 @@ fn a_disk_that_fills_up() {
     folder.runs(&["--out", "reference"]);
     let reference = contents(&folder.path("reference"));
     // The compressed file is not counted beforehand, so the disk itself has to refuse, at one place or another.
-    for kilobytes in (4..96).step_by(8) {
+    for kilobytes in (4..128).step_by(8) {
         let Some(disk) = TinyDisk::mount(folder.path(&format!("disk{kilobytes}")), kilobytes) else {
             assert!(std::env::var_os("CI").is_none(), "continuous integration has to mount a small disk, and can't");
             eprintln!("this user can't mount; nothing tested");

@@ -5,7 +5,9 @@ mod faults;
 mod input;
 mod interrupt;
 mod limits;
+mod mesh;
 mod pictures;
+mod provenance;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

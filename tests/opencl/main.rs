@@ -2,6 +2,8 @@
 //! installs; what happens without one is tested too.
 
 mod parity;
+#[path = "../support/smaller.rs"]
+mod smaller;
 mod without;
 
 use std::path::Path;

@@ -7,6 +7,7 @@
 
 use std::fmt::Write;
 
+use super::super::vtk::text::text_array;
 use super::super::xml::escape;
 use super::{ArraySpec, Compression, Settings};
 use crate::volume::Grid;
@@ -15,6 +16,9 @@ use crate::volume::Grid;
 const TAG_PLACE: usize = 4079;
 /// The size of those chunks.
 const CHUNK: usize = 4096;
+
+/// What the appended bytes begin with.
+pub(super) const TAG: &str = "<AppendedData encoding=\"raw\">";
 
 /// What closes the head behind the arrays.
 pub(super) const BEHIND_ARRAYS: &str = "      </PointData>\n      <CellData/>\n    </Piece>\n  </ImageData>\n";
@@ -27,10 +31,16 @@ pub(super) fn appended<'a>(before: String, arrays: impl Iterator<Item = (&'a Arr
         let _ = writeln!(head, "        <DataArray {attributes} format=\"appended\" offset=\"{offset}\"/>");
     }
     head.push_str(BEHIND_ARRAYS);
+    pad(&mut head);
+    head.push_str(TAG);
+    head.push_str("\n_");
+    head
+}
+
+/// Adds spaces such that the tag behind them stands where every ParaView reads it.
+pub(super) fn pad(head: &mut String) {
     let padding = (TAG_PLACE + CHUNK - head.len() % CHUNK) % CHUNK;
     head.extend(std::iter::repeat_n(' ', padding));
-    head.push_str("<AppendedData encoding=\"raw\">\n_");
-    head
 }
 
 /// The head in front of the arrays; `scalars` is the array that ParaView shows first.
@@ -57,10 +67,9 @@ pub(super) fn before_arrays(grid: &Grid, settings: &Settings, scalars: Option<&A
             let _ = writeln!(head, "      {open}{time:?}</DataArray>");
         }
         for (name, text) in &settings.field_data {
-            // VTK writes a string as the numbers of its bytes, and a zero.
-            let codes: String = text.bytes().map(|b| format!("{b} ")).collect();
-            let attributes = format!("Name=\"{}\" NumberOfTuples=\"1\" format=\"ascii\"", escape(name));
-            let _ = writeln!(head, "      <Array type=\"String\" {attributes}>{codes}0</Array>");
+            head.push_str("      ");
+            head.push_str(&text_array(name, text));
+            head.push('\n');
         }
         head.push_str("    </FieldData>\n");
     }

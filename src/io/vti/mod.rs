@@ -12,7 +12,7 @@
 mod head;
 mod spool;
 
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{BufRead, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 
 use base64::engine::general_purpose::STANDARD;
@@ -111,6 +111,31 @@ pub fn write<W: Write + Seek>(sink: W, volume: &Volume, settings: &Settings) -> 
         writer.write_slab(i, 0, &array.values)?;
     }
     writer.finish()
+}
+
+/// Copies a file that this writer made, with another text in its field data under this name.
+///
+/// # Errors
+/// If it has no such text, or reading or writing fails.
+pub fn retell(
+    mut source: impl BufRead,
+    mut sink: impl Write,
+    encoding: Encoding,
+    text: (&str, &str),
+) -> Result<(), Error> {
+    super::vtk::text::retell(&mut source, &mut sink, text, |head, source| {
+        if encoding == Encoding::Inline {
+            return Ok(());
+        }
+        // The head has another length now, and its end a place of its own.
+        super::vtk::text::read_to(source, head::TAG.as_bytes(), head)?;
+        head.truncate(head.len() - head::TAG.len());
+        let mut text = String::from_utf8_lossy(head.trim_ascii_end()).into_owned() + "\n";
+        head::pad(&mut text);
+        text.push_str(head::TAG);
+        *head = text.into_bytes();
+        Ok(())
+    })
 }
 
 /// A `.vti` file in the making.

@@ -25,6 +25,7 @@ mod image;
 mod legacy;
 mod mesh;
 mod nesting;
+pub(in crate::io) mod text;
 
 use std::path::Path;
 

@@ -4,8 +4,8 @@
 //!
 //! - [`convergence`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A level is repeated with other
 //!   seeds until it has traced [`convergence::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
-//! - [`pictures`]: what becomes of the values in an image: `flat` and `smooth` shading against the value of each visible
-//!   point itself;
+//! - [`pictures`]: every way to shade an image, `flat`, `smooth`, `voxel`, `voxel` denoised, and `auto`, against the value of
+//!   each visible point itself;
 //! - [`precision`]: on how many rays plain Cramer's rule, in `f32` and in `f64`, says something else than exact signs; and
 //!   what each deviation of the published algorithm does to its values.
 //!
@@ -134,7 +134,9 @@ fn of_mesh<const D: usize>(
     }
     let deviations = precision::deviations(&bench, &truth, progress)?;
     let differing = precision::differing(&tracer, seed, progress)?;
-    let render = pipeline.plan.all::<RenderPlan>().find(|(_, r)| r.scene == scene && r.occlusion.is_some());
+    let renders = || pipeline.plan.all::<RenderPlan>().filter(|(_, r)| r.scene == scene);
+    // Its camera is what counts, so one without occlusion does if there is no other.
+    let render = renders().find(|(_, r)| r.occlusion.is_some()).or_else(|| renders().next());
     let pictures = render
         .map(|(stage, render)| pictures::measure(&tracer, pipeline.plan.id(stage), render, seed, progress))
         .transpose()?

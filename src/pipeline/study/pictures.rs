@@ -1,7 +1,8 @@
-//! What the values at vertices are worth in an image.
+//! Every way to shade an image: its error against the time it takes.
 //!
-//! `flat` and `smooth` shading spread the vertices' values over each simplex; the reference is the value at each visible
-//! point itself. The image is the pipeline's first of the scene, with fewer voxels.
+//! `flat` and `smooth` spread the vertices' values over each simplex; `voxel` takes rays at each visible point, and
+//! `voxel+denoise` filters what few rays found there; `auto` interpolates and mends. The truth is the value at each visible
+//! point itself, exact or by many rays. The image is the pipeline's first of the scene, with fewer voxels.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,6 +13,8 @@ use crate::occlusion::exact::Budget;
 use crate::occlusion::{Error, Estimator};
 use crate::pipeline::RunError;
 use crate::progress::Progress;
+use crate::render::filters::denoise;
+use crate::render::filters::denoise::Refine;
 use crate::render::{Aov, Renderer, Shading};
 use crate::stages::camera::camera;
 use crate::stages::render::RenderPlan;
@@ -26,6 +29,22 @@ const REFERENCE: u32 = 1024;
 /// Scenes with at most so many simplices have an exact reference.
 const EXACT_UP_TO: usize = 100;
 const BUDGET: Budget = Budget { cones: 20_000 };
+/// What is compared, each with so many rays a vertex or, by `voxel`, a voxel.
+const SHADINGS: &[(&str, &[u32])] = &[
+    ("flat", &[16, 64, 256, 1024]),
+    ("smooth", &[16, 64, 256, 1024]),
+    ("voxel", &[4, 16, 64, 256]),
+    ("voxel+denoise", &[1, 4, 16, 64]),
+    ("auto", &[64, 256, 1024]),
+];
+
+/// The standard error to which `auto` keeps, as a render does where nothing else is said.
+const TOLERANCE: f64 = 0.01;
+
+/// The rays that `auto` takes at a voxel at first, beside so many at a vertex.
+fn rays_beside(samples: u32) -> u32 {
+    (samples / 16).clamp(4, 16)
+}
 
 /// Errors in an image.
 #[derive(Clone, Debug)]
@@ -72,14 +91,21 @@ pub fn measure<const D: usize>(
     let watch = Unheard(progress);
     let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Arc::clone(tracer)));
     let points = ShadingPoint::vertices(tracer.mesh());
-    let image = |shading: Shading| -> Result<Vec<Array>, Error> {
-        let renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading);
+    // Denoised, where it is said with how many rays a voxel, and refined by at most so many.
+    let filtered = |shading: Shading, rays: Option<u32>, most: Option<u32>| -> Result<Vec<Array>, Error> {
+        let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading);
+        if let Some(rays) = rays {
+            renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, Sampling::new(rays, seed)));
+        }
+        if let Some(most) = most {
+            renderer.filters.push(Box::new(Refine::new(Arc::clone(&backend), Sampling::new(most, seed), TOLERANCE)));
+        }
         Ok(renderer.volume(&[Aov::AmbientOcclusion, Aov::Opacity], &watch)?.arrays)
     };
+    let image = |shading: Shading| filtered(shading, None, None);
     let by_rays = |samples| Estimator::Sampled(Sampling::new(samples, seed));
-    let vertex_samples = [16, 64, 256, 1024];
-    let voxel_samples = [16, 64, 256];
-    let _running = progress.stage("study: pictures", (2 * vertex_samples.len() + voxel_samples.len() + 1) as u64);
+    let steps = SHADINGS.iter().map(|(_, samples)| samples.len()).sum::<usize>() + 1;
+    let _running = progress.stage("study: pictures", steps as u64);
     let small = tracer.mesh().simplices.len() <= EXACT_UP_TO;
     let (reference, name) = match small.then(|| image(Shading::Voxel(Estimator::Exact(BUDGET)))) {
         Some(Ok(arrays)) => (arrays, "exact at each visible point".to_owned()),
@@ -105,18 +131,23 @@ pub fn measure<const D: usize>(
         }
         progress.advance(1);
     };
-    for shading in ["flat", "smooth"] {
-        for samples in vertex_samples {
+    for (shading, samples) in SHADINGS {
+        for &samples in *samples {
             let (arrays, seconds) = timed(|| {
-                let values = Arc::new(by_rays(samples).estimate(&*backend, &points, None, &watch)?);
-                image(if shading == "flat" { Shading::Flat(values) } else { Shading::Smooth(values) })
+                let at_vertices = || by_rays(samples).estimate(&*backend, &points, None, &watch).map(Arc::new);
+                match *shading {
+                    "flat" => image(Shading::Flat(at_vertices()?)),
+                    "smooth" => image(Shading::Smooth(at_vertices()?)),
+                    "voxel" => image(Shading::Voxel(by_rays(samples))),
+                    "voxel+denoise" => filtered(Shading::Voxel(by_rays(samples)), Some(samples), None),
+                    _ => {
+                        let own = rays_beside(samples);
+                        filtered(Shading::Auto(at_vertices()?, by_rays(own)), Some(own), Some(samples))
+                    }
+                }
             })?;
             add(shading, samples, seconds, &arrays);
         }
-    }
-    for samples in voxel_samples {
-        let (arrays, seconds) = timed(|| image(Shading::Voxel(by_rays(samples))))?;
-        add("voxel", samples, seconds, &arrays);
     }
     let pictures = Pictures { render: id.to_owned(), dimensions, seen: seen.len(), reference: name, rows };
     Ok((pictures.seen > 0).then_some(pictures))

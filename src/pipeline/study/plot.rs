@@ -49,6 +49,7 @@ fn colour(name: &str) -> &'static str {
         "random" | "voxel" => "#0072b2",
         "sobol" | "smooth" => "#009e73",
         "exact" => "#555555",
+        "voxel+denoise" => "#56b4e9",
         _ => "#cc79a7",
     }
 }
@@ -58,6 +59,8 @@ fn marker(name: &str, x: f64, y: f64) -> String {
     match name {
         "as_published" | "flat" => format!("<rect x='{:.1}' y='{:.1}' width='7' height='7'/>", x - 3.5, y - 3.5),
         "random" | "voxel" => format!("<circle cx='{x:.1}' cy='{y:.1}' r='3.8'/>"),
+        "voxel+denoise" => format!("<path d='M{x:.1} {:.1}l4.8 8h-9.6z'/>", y - 5.0),
+        "auto" => format!("<path d='M{x:.1} {:.1}l4.8 -8h-9.6z'/>", y + 5.0),
         _ => format!("<path d='M{x:.1} {:.1}l4.6 4.6l-4.6 4.6l-4.6 -4.6z'/>", y - 4.6),
     }
 }

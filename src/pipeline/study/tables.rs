@@ -94,7 +94,8 @@ pub(super) fn markdown(study: &Study) -> String {
         line(format_args!("\n## Shading\n"));
         line(format_args!(
             "The image `{}` with {x} x {y} x {z} voxels, {} of which see something, against {}. `flat` and `smooth` take rays \
-             at vertices, `voxel` at each voxel; time is that of the whole image on all threads.\n",
+             at vertices, `voxel` at each voxel, `auto` at vertices and first a sixteenth of them, 4 to 16, at each voxel, then as many as keep to an error of 0.01; time is \
+             that of the whole image on all threads.\n",
             pictures.render,
             grouped(pictures.seen as u64),
             pictures.reference
@@ -111,7 +112,7 @@ pub(super) fn markdown(study: &Study) -> String {
             ));
         }
     }
-    line(format_args!("\n## The published algorithm, slip by slip\n"));
+    line(format_args!("\n## The published algorithm, deviation by deviation\n"));
     line(format_args!("Occlusion, 1 - A, of 1024 rays a vertex, with one thing mended at a time (Djami 2021).\n"));
     line(format_args!("| variant | least | mean | largest | RMS error |"));
     line(format_args!("| --- | ---: | ---: | ---: | ---: |"));

@@ -11,11 +11,13 @@
 //! a later check wants to cite them; and its errors carry no path.
 
 mod decode;
+mod emit;
 mod parse;
 mod path;
 mod problem;
 
 pub(super) use decode::decode;
+pub(super) use emit::{emit, fill, map, node};
 pub(super) use parse::parse;
 pub(super) use path::{Segment, parse_path, show_path};
 pub(super) use problem::Problem;

@@ -7,13 +7,13 @@
 //!
 //! A new filter is one file here, and one line in [`Renderer::filters`](super::Renderer).
 
-mod denoise;
+pub mod denoise;
 mod dilate;
 
 use std::fmt;
 use std::ops::Range;
 
-pub use denoise::Denoise;
+pub use denoise::denoise;
 pub use dilate::Dilate;
 
 use super::gbuffer::{Columns, GBuffer};

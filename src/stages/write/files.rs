@@ -27,6 +27,7 @@ impl PictureFiles {
     pub fn create(
         render: Ref<RenderPlan>,
         plan: &Plan,
+        told: &str,
         stale: &dyn Fn(&Path) -> bool,
         grid: &Grid,
         mesh_hash: &str,
@@ -42,7 +43,7 @@ impl PictureFiles {
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == render) {
             for file in write.stale(Content::Voxels, stale) {
                 let path = plan.out.join(&file.path);
-                let opened = file.format.open(Opening { path: &path, plan, write, grid, mesh_hash })?;
+                let opened = file.format.open(Opening { path: &path, plan, write, grid, mesh_hash, told })?;
                 let places = file.format.arrays(write).into_iter().map(&mut place).collect();
                 files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
             }

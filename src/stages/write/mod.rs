@@ -8,15 +8,15 @@ mod files;
 mod png;
 mod raw;
 mod vti;
-mod vtu;
+pub(super) mod vtu;
 
-use std::io::Write;
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Serialize, Serializer};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::camera::camera;
 use super::describe::{Counts, Totals, size};
@@ -74,9 +74,13 @@ trait OutputFormat {
         Ok(None)
     }
 
+    /// Puts another text in the place of the one that a file tells of the pipeline; none if its files tell none.
+    const RETELL: Option<Retell> = None;
+
     /// Writes a file of a mesh; returns its length, and how many simplices had to be left out.
     fn write_mesh<const D: usize>(
         _path: &Path,
+        _told: &str,
         _mesh: &Mesh<D>,
         _camera: &Camera<D>,
         _found: Option<&Estimates>,
@@ -85,6 +89,9 @@ trait OutputFormat {
     }
 }
 
+/// Writes the file at the path again, with another text of the pipeline; returns its length.
+type Retell = fn(&Path, &WritePlan, &str) -> Result<u64, Error>;
+
 /// What a file is opened with.
 struct Opening<'a> {
     path: &'a Path,
@@ -92,6 +99,7 @@ struct Opening<'a> {
     write: &'a WritePlan,
     grid: &'a Grid,
     mesh_hash: &'a str,
+    told: &'a str,
 }
 
 /// An open file that takes a picture slab by slab.
@@ -169,14 +177,19 @@ macro_rules! formats {
                 match self { $(Self::$name => <$key::$name>::open(file)),+ }
             }
 
+            fn retell(self) -> Option<Retell> {
+                match self { $(Self::$name => <$key::$name>::RETELL),+ }
+            }
+
             fn write_mesh<const D: usize>(
                 self,
                 path: &Path,
+                told: &str,
                 mesh: &Mesh<D>,
                 camera: &Camera<D>,
                 found: Option<&Estimates>,
             ) -> Result<(u64, usize), Error> {
-                match self { $(Self::$name => <$key::$name>::write_mesh(path, mesh, camera, found)),+ }
+                match self { $(Self::$name => <$key::$name>::write_mesh(path, told, mesh, camera, found)),+ }
             }
 
             /// The file that is written under its key.
@@ -377,9 +390,29 @@ impl Stage for WritePlan {
                 }
             };
             let pipeline = format.tells_pipeline().then(|| keys.provenance());
-            Output { file: path.clone(), beside: Vec::new(), key: keys.hash(&(part, format.key(), pipeline)) }
+            let tells = format.retell().map(|_| path.clone());
+            Output { file: path.clone(), beside: Vec::new(), key: keys.hash(&(part, format.key(), pipeline)), tells }
         };
         plan[me].files.iter().map(output).collect()
+    }
+
+    fn retell(me: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, Error> {
+        let write = &plan[me];
+        let file = write.files.iter().find(|file| file.path == output).and_then(|file| file.format.retell());
+        file.map_or(Ok(0), |retell| retell(&plan.out.join(output), write, text))
+    }
+
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let write = &plan[me];
+        if write.files.get(Format::Vti).is_none() {
+            return Value::Null;
+        }
+        let mut written = json!({ "encoding": write.encoding, "compression": write.compression });
+        // Else figures add to them, and do so again.
+        if write.arrays_given {
+            written["arrays"] = json!(write.arrays);
+        }
+        written
     }
 
     fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
@@ -431,7 +464,7 @@ impl Stage for WritePlan {
             }
             let (mesh, camera) = (scene.session.mesh(), camera(&render.camera)?);
             let values = render.occlusion.map(|occlusion| &*scene.values[&occlusion]);
-            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), mesh, &camera, values)?;
+            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), run.told, mesh, &camera, values)?;
             let note = format!(
                 "{}: {left_out} of {} simplices are not wholly before the eye and are left out",
                 path.display(),
@@ -441,6 +474,18 @@ impl Stage for WritePlan {
         }
         Ok(String::new())
     }
+}
+
+/// Copies a file to one that takes its place when it is whole: `copy` is given both. Returns its length.
+fn copy_over(
+    path: &Path,
+    copy: impl FnOnce(BufReader<std::fs::File>, &mut AtomicFile) -> Result<(), Error>,
+) -> Result<u64, Error> {
+    let failed = |cause| Error::File { path: path.to_owned(), action: "be read", cause };
+    let source = BufReader::with_capacity(1 << 18, crate::input::open(path).map_err(failed)?);
+    let mut file = AtomicFile::create(path)?;
+    copy(source, &mut file).map_err(AtomicFile::name_in(path))?;
+    file.commit()
 }
 
 /// Writes a file in one piece; returns its length.

@@ -1,10 +1,11 @@
 //! `.png`: a quick look at three slices, without ParaView.
 
+use std::io::Read;
 use std::path::PathBuf;
 
-use super::{Content, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
+use super::{Content, LeftOut, Opening, OutputFormat, Retell, VoxelFile, WritePlan, copy_over};
 use crate::io::png::{self, Slices};
-use crate::io::{AtomicFile, Error};
+use crate::io::{AtomicFile, Error, PIPELINE};
 use crate::render::Aov;
 use crate::volume::{Array, Values};
 
@@ -22,9 +23,17 @@ impl OutputFormat for Png {
         vec![Aov::Rgba]
     }
 
-    fn open(Opening { path, grid, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+    const RETELL: Option<Retell> = Some(|path, _, text| {
+        copy_over(path, |mut source, out| {
+            let mut bytes = Vec::new();
+            source.read_to_end(&mut bytes)?;
+            png::retell(&bytes, out, (PIPELINE, text))
+        })
+    });
+
+    fn open(Opening { path, grid, told, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
         let out = AtomicFile::create(path)?;
-        Ok(Some(Box::new(File { path: path.to_owned(), out, slices: Slices::new(grid) })))
+        Ok(Some(Box::new(File { path: path.to_owned(), out, slices: Slices::new(grid), told: told.to_owned() })))
     }
 }
 
@@ -32,6 +41,7 @@ struct File {
     path: PathBuf,
     out: AtomicFile,
     slices: Slices,
+    told: String,
 }
 
 impl VoxelFile for File {
@@ -43,7 +53,8 @@ impl VoxelFile for File {
     }
 
     fn finish(mut self: Box<Self>) -> Result<u64, Error> {
-        png::write(&mut self.out, &[&self.slices]).map_err(AtomicFile::name_in(&self.path))?;
+        let text = Some((PIPELINE, &*self.told));
+        png::write_told(&mut self.out, &[&self.slices], text).map_err(AtomicFile::name_in(&self.path))?;
         self.out.commit()
     }
 }

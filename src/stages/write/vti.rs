@@ -4,10 +4,12 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::{Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, VoxelFile, WritePlan};
+use super::{
+    Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, Retell, VoxelFile, WritePlan, copy_over,
+};
 use crate::geometry::Dimension;
 use crate::io::vti::{self, ArraySpec, VtiWriter};
-use crate::io::{AtomicFile, Error};
+use crate::io::{AtomicFile, Error, PIPELINE};
 use crate::render::Aov;
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
@@ -41,10 +43,16 @@ impl OutputFormat for Vti {
         }
     }
 
-    fn open(Opening { path, plan, write, grid, mesh_hash }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+    const RETELL: Option<Retell> = Some(|path, write, text| {
+        copy_over(path, |source, out| vti::retell(source, out, encoding(write), (PIPELINE, text)))
+    });
+
+    fn open(
+        Opening { path, plan, write, grid, mesh_hash, told }: Opening,
+    ) -> Result<Option<Box<dyn VoxelFile>>, Error> {
         let dimension = plan[plan[write.render].scene].dimension;
         let specs: Vec<ArraySpec> = write.arrays.iter().map(|&channel| array_spec(channel, dimension)).collect();
-        let settings = settings(plan, write, mesh_hash, path.parent());
+        let settings = settings(plan, write, mesh_hash, told, path.parent());
         let out = AtomicFile::create(path)?;
         let writer = VtiWriter::new(out, grid, &specs, &settings).map_err(AtomicFile::name_in(path))?;
         Ok(Some(Box::new(File { path: path.to_owned(), writer })))
@@ -77,8 +85,15 @@ fn array_spec(aov: Aov, dimension: Dimension) -> ArraySpec {
     ArraySpec::new(aov.name(), aov.kind(), components)
 }
 
+fn encoding(write: &WritePlan) -> vti::Encoding {
+    match write.encoding {
+        Encoding::Appended => vti::Encoding::Appended,
+        Encoding::Inline => vti::Encoding::Inline,
+    }
+}
+
 /// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
-fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Path>) -> vti::Settings {
+fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, told: &str, scratch: Option<&Path>) -> vti::Settings {
     let render = &plan[write.render];
     let scene = &plan[render.scene];
     let occlusion = render.occlusion.map(|o| match &plan[o].source {
@@ -93,14 +108,12 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Pa
         "dimensions": render.dimensions,
         "shading": render.shading,
         "denoise": render.denoise,
+        "tolerance": render.tolerance,
         "supersample": render.supersample,
         "dilate": render.dilate,
     });
     vti::Settings {
-        encoding: match write.encoding {
-            Encoding::Appended => vti::Encoding::Appended,
-            Encoding::Inline => vti::Encoding::Inline,
-        },
+        encoding: encoding(write),
         compression: match write.compression {
             Compression::None => vti::Compression::None,
             Compression::Zlib => vti::Compression::Zlib,
@@ -108,7 +121,7 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, scratch: Option<&Pa
         },
         field_data: vec![
             ("program".to_owned(), PROGRAM.to_owned()),
-            ("pipeline".to_owned(), plan.name.clone()),
+            (PIPELINE.to_owned(), told.to_owned()),
             ("settings".to_owned(), settings.to_string()),
         ],
         scratch: scratch.map(Path::to_owned),

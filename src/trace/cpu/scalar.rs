@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::accel::Tracer;
-use crate::geometry::Ray;
+use crate::geometry::{Dimension, Ray};
 use crate::progress::{Cancelled, Progress};
 use crate::trace::estimate::{Accumulator, Estimate};
 use crate::trace::{Error, NOTHING, RayBackend, Sampling, Sequence, ShadingPoint, Surroundings};
@@ -30,7 +30,7 @@ pub fn estimate_at<const D: usize>(
     }
     let frame = surroundings.frame();
     let mut sequence = Sequence::new(sampling.sampler, sampling.seed, point.number());
-    let mut accumulator = Accumulator::new(sampling.sampler);
+    let mut accumulator = Accumulator::new(sampling.sampler, Dimension::of::<D>());
     while accumulator.rays() < sampling.samples && !sampling.target.is_some_and(|target| target.is_met(&accumulator)) {
         if accumulator.rays().is_multiple_of(RAYS_BETWEEN_LOOKS) && progress.cancelled() {
             return Err(Cancelled);

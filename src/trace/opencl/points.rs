@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::backend::{MOST_RAYS, OnDevice, OpenClBackend, Part, float4, is_exact, sampled_point};
 use super::device::Argument;
 use super::layout::{self, Float4, StarCone};
-use crate::geometry::{Cone, Frame, Vector};
+use crate::geometry::{Cone, Dimension, Frame, Vector};
 use crate::progress::{Cancelled, Progress};
 use crate::trace::backend::{Error, NOTHING};
 use crate::trace::estimate::{Accumulator, Estimate};
@@ -85,7 +85,7 @@ impl<const D: usize> OpenClBackend<D> {
         let sampling = chunk.sampling;
         let run = |p: &Prepared<D>| Running {
             sequence: Sequence::new(sampling.sampler, sampling.seed, p.number),
-            accumulator: Accumulator::new(sampling.sampler),
+            accumulator: Accumulator::new(sampling.sampler, Dimension::of::<D>()),
         };
         let mut running: Vec<Running> = chunk.prepared.par_iter().map(run).collect();
         // Without a normal there is nothing to ask.

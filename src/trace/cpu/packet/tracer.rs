@@ -11,7 +11,7 @@ use super::traverse::Traversal;
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2, Avx512};
 use crate::accel::Tracer;
-use crate::geometry::{Frame, Ray, Vector};
+use crate::geometry::{Dimension, Frame, Ray, Vector};
 use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
 use crate::trace::cpu::scalar::estimate_at;
@@ -196,7 +196,7 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
         Source::Sequence { samples, sequence, .. } => (*samples as usize, sequence.sampler()),
         Source::Directions(directions) => (directions.len(), Sampler::Random),
     };
-    let mut accumulator = Accumulator::new(sampler);
+    let mut accumulator = Accumulator::new(sampler, Dimension::of::<D>());
     for (block, first) in (0..total).step_by(BLOCK).enumerate() {
         if block % BLOCKS_BETWEEN_LOOKS == 0 && progress.cancelled() {
             return Err(Cancelled);

@@ -1,0 +1,103 @@
+//! How far off the occlusion of a picture is, measured: some of its voxels are looked at again, with many rays.
+//!
+//! The voxels are chosen by a hash of their number, the lowest of those that see something, so that the choice depends on
+//! nothing but the picture. The rays' own variance is known ([`Sampling::expected_variance`]) and taken off:
+//!
+//! ```text
+//! RMS^2 = mean of ((shown - looked at)^2 - variance)
+//! ```
+//!
+//! So the number holds for any shading, and for what no shading says of itself: values interpolated across a contact, or
+//! by a method that is wrong.
+
+use std::collections::BTreeMap;
+
+use super::NOTHING;
+use super::gbuffer::{Columns, GBuffer};
+use crate::geometry::Dimension;
+use crate::occlusion::{Error, Estimator};
+use crate::progress::{Progress, Uncounted};
+use crate::trace::{RayBackend, Sampling, ShadingPoint};
+
+/// Voxels that are looked at.
+const VOXELS: usize = 512;
+
+/// How far off a picture's occlusion is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accuracy {
+    /// The root mean square of what voxels are off.
+    pub rms: f64,
+    /// The most that a voxel was off, of those that were looked at.
+    pub largest: f64,
+    /// How many voxels were looked at.
+    pub voxels: usize,
+}
+
+/// Voxels to be looked at again.
+#[derive(Debug)]
+pub(super) struct Audit<const D: usize> {
+    sampling: Sampling,
+    /// Points and the occlusion that is shown there, by the hash of the voxel's number.
+    chosen: BTreeMap<(u64, usize), (ShadingPoint<D>, f32)>,
+}
+
+impl<const D: usize> Audit<D> {
+    /// What it needs to know of voxels.
+    pub const COLUMNS: Columns =
+        Columns::SIMPLEX.union(Columns::POSITION).union(Columns::NORMAL).union(Columns::OCCLUSION);
+
+    /// Looks again with these rays, which must be others than the picture's own.
+    pub fn new(sampling: Sampling) -> Self {
+        Self { sampling, chosen: BTreeMap::new() }
+    }
+
+    /// Chooses among some finished layers.
+    pub fn add(&mut self, buffer: &GBuffer<D>) {
+        let first = buffer.layers().start * buffer.layer_len();
+        for i in (0..buffer.len()).filter(|&i| buffer.simplex[i] != NOTHING) {
+            let key = (hash((first + i) as u64), first + i);
+            if self.chosen.len() == VOXELS && self.chosen.last_key_value().is_some_and(|(last, _)| *last < key) {
+                continue;
+            }
+            let point = ShadingPoint::Inside {
+                position: buffer.position[i],
+                normal: buffer.normal[i],
+                simplex: buffer.simplex[i],
+                number: (first + i) as u64,
+            };
+            self.chosen.insert(key, (point, buffer.occlusion[i]));
+            if self.chosen.len() > VOXELS {
+                self.chosen.pop_last();
+            }
+        }
+    }
+
+    /// Looks at what was chosen; none if no voxel sees anything.
+    ///
+    /// # Errors
+    /// If `progress` says so, or a device fails.
+    pub fn finish(self, backend: &dyn RayBackend<D>, progress: &dyn Progress) -> Result<Option<Accuracy>, Error> {
+        let (points, shown): (Vec<_>, Vec<f32>) = self.chosen.into_values().unzip();
+        let found = Estimator::Sampled(self.sampling).estimate(backend, &points, None, &Uncounted(progress))?;
+        let (mut sum, mut largest) = (0.0, 0.0f64);
+        for (&truth, &shown) in found.values.iter().zip(&shown) {
+            let (truth, shown) = (f64::from(truth), f64::from(shown));
+            let noise = self.sampling.expected_variance(Dimension::of::<D>(), truth);
+            // Where all rays agree with what is shown there is nothing to take off.
+            let square = if truth == shown { 0.0 } else { (truth - shown).powi(2) - noise };
+            sum += square;
+            largest = largest.max(square.max(0.0).sqrt());
+        }
+        let voxels = points.len();
+        let rms = (sum.max(0.0) / voxels.max(1) as f64).sqrt();
+        Ok((voxels > 0).then_some(Accuracy { rms, largest, voxels }))
+    }
+}
+
+/// Spreads numbers evenly (the finaliser of SplitMix64; Steele, Lea and Flood 2014).
+fn hash(number: u64) -> u64 {
+    let mut x = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}

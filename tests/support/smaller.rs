@@ -1,0 +1,48 @@
+//! The shipped pipelines, and what makes them quick to run.
+
+use std::path::{Path, PathBuf};
+
+use ao4d::pipeline::Pipeline;
+use ao4d::stages::occlusion::{OcclusionPlan, OcclusionSource, Samples};
+use ao4d::stages::render::RenderPlan;
+
+/// All `.yaml` files below `pipelines/`.
+pub fn pipelines() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "yaml") {
+                found.push(path);
+            }
+        }
+    }
+    assert!(found.len() >= 10, "{found:?}");
+    found.sort();
+    found
+}
+
+/// Overrides that make images of a pipeline smaller, and its rays fewer. Every stage still does its work.
+pub fn smaller(path: &Path) -> Vec<String> {
+    let plan = Pipeline::load(path, &[], None).unwrap().plan;
+    let mut overrides = Vec::new();
+    for (stage, render) in plan.all::<RenderPlan>() {
+        let [_, _, z] = render.dimensions;
+        let most = if z == 1 { 120 } else { 36 };
+        let longest = render.dimensions.into_iter().fold(most, usize::max);
+        let [x, y, z] = render.dimensions.map(|d| (d * most / longest).max(1));
+        let dimensions = if z == 1 { format!("[{x}, {y}]") } else { format!("[{x}, {y}, {z}]") };
+        overrides.push(format!("{}.dimensions={dimensions}", plan.path(stage)));
+    }
+    for (stage, occlusion) in plan.all::<OcclusionPlan>() {
+        if let OcclusionSource::Compute(computation) = &occlusion.source
+            && let Samples::Fixed(17..) = computation.samples
+        {
+            overrides.push(format!("{}.samples=16", plan.path(stage)));
+        }
+    }
+    overrides
+}
