@@ -105,7 +105,19 @@ impl Info {
         let bytes = std::fs::metadata(path).map_err(|cause| Error::Open { path: path.into(), cause })?.len();
         let description = match crate::io::image::is_measurement(path) {
             true => Description::Grid(Box::new(ImageSummary::read(path, array)?)),
-            false => Description::of(&Contents::read(path)?),
+            false => match super::floats(path)? {
+                Some((floats, name, 3)) => Description::raw(floats.summary(name, 3)?),
+                Some((floats, name, components)) => {
+                    Description::Occlusion { values: floats.summary(name, components)?, sidecar: None }
+                }
+                None => {
+                    let contents = Contents::read(path)?;
+                    if let Contents::Mesh(mesh) = &contents {
+                        super::needs(path, SurfaceSummary::memory(mesh))?;
+                    }
+                    Description::of(&contents)
+                }
+            },
         };
         Ok(Self { path: path.into(), bytes, description })
     }
@@ -123,10 +135,12 @@ impl Description {
             Contents::Occlusion(values, sidecar) => {
                 Self::Occlusion { values: list(OCCLUSION, 1, values), sidecar: sidecar.clone() }
             }
-            Contents::Raw(values) => {
-                Self::Raw { floats: values.len(), voxels: values.len() / 3, values: list(COLOURS, 3, values) }
-            }
+            Contents::Raw(values) => Self::raw(list(COLOURS, 3, values)),
         }
+    }
+
+    fn raw(values: ArraySummary) -> Self {
+        Self::Raw { floats: 3 * values.tuples, voxels: values.tuples, values }
     }
 
     fn image(image: &Image) -> Self {

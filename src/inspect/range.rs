@@ -54,22 +54,40 @@ pub struct Range {
 impl Range {
     /// Of these numbers.
     pub fn of(numbers: impl Iterator<Item = f64>) -> Self {
-        let mut range = Self::default();
-        let (mut sum, mut count) = (0.0, 0usize);
-        for x in numbers {
-            if x.is_nan() {
-                range.nan += 1;
-            } else if x.is_infinite() {
-                range.infinite += 1;
-            } else {
-                range.min = Some(range.min.map_or(x, |m: f64| m.min(x)));
-                range.max = Some(range.max.map_or(x, |m: f64| m.max(x)));
-                sum += x;
-                count += 1;
-            }
+        let mut tally = Tally::default();
+        numbers.for_each(|x| tally.add(x));
+        tally.range()
+    }
+}
+
+/// A range in the making.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tally {
+    range: Range,
+    sum: f64,
+    count: usize,
+}
+
+impl Tally {
+    /// One more number.
+    pub fn add(&mut self, x: f64) {
+        let range = &mut self.range;
+        if x.is_nan() {
+            range.nan += 1;
+        } else if x.is_infinite() {
+            range.infinite += 1;
+        } else {
+            range.min = Some(range.min.map_or(x, |m: f64| m.min(x)));
+            range.max = Some(range.max.map_or(x, |m: f64| m.max(x)));
+            self.sum += x;
+            self.count += 1;
         }
-        range.mean = (count > 0).then(|| sum / count as f64);
-        range
+    }
+
+    /// Of all numbers so far.
+    pub fn range(mut self) -> Range {
+        self.range.mean = (self.count > 0).then(|| self.sum / self.count as f64);
+        self.range
     }
 }
 

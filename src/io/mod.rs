@@ -32,6 +32,6 @@ mod xml;
 /// The name under which files tell of the pipeline that they were made by.
 pub const PIPELINE: &str = "pipeline";
 
-pub use atomic::{AtomicFile, check_free_space, check_writable, free_space};
+pub use atomic::{AtomicFile, Unfinished, abandon, check_free_space, check_writable, free_space, together};
 pub use error::Error;
 pub use input::{Input, InputError};
