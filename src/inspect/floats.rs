@@ -55,7 +55,7 @@ impl Floats {
             (0..block.len()).for_each(|i| tallies[i % components].add(block.get(i)));
         }
         let ranges = tallies.into_iter().map(Tally::range).collect();
-        Ok(ArraySummary { name: name.into(), kind: Kind::F32, components, tuples, ranges })
+        Ok(ArraySummary { name: name.into(), kind: Kind::F32, components, tuples, ranges, histogram: Vec::new() })
     }
 
     /// How far the numbers of two files are apart.

@@ -143,7 +143,10 @@ pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, 
 }
 
 /// What files are read as a whole.
-const ENDINGS: [&str; 11] = ["f32", "raw", "stl", "ply", "obj", "msh", "vti", "vtu", "vtp", "vtk", "xml"];
+const ENDINGS: [&str; 16] = [
+    "f32", "raw", "stl", "ply", "obj", "msh", "pvd", "series", "vti", "vtu", "vtp", "pvti", "pvtu", "pvtp", "vtk",
+    "xml",
+];
 /// How many bytes of memory a byte of a file takes at least, while it is read.
 const BYTES_IN_MEMORY: u64 = 3;
 /// Bytes of a colour.
