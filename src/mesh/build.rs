@@ -132,11 +132,7 @@ impl<const D: usize> MeshBuilder<D> {
             let angle = match (&given, crease) {
                 (Some(_), _) => None,
                 // A vertex has one normal, but not for both sides of a sheet.
-                (None, Crease::Never) => {
-                    let sheets =
-                        sides.any_two_sided(&simplices) || corners::has_flat_folds(&mesh, simplices.clone(), &sides);
-                    sheets.then_some(None)
-                }
+                (None, Crease::Never) => sides.any_two_sided(&simplices).then_some(None),
                 (None, Crease::Above(degrees)) => Some(Some(degrees)),
                 (None, Crease::Rough) => Some(Some(corners::rough_angle(&mesh, simplices.clone()))),
             };

@@ -156,8 +156,7 @@ fn groups<const D: usize>(
     sides: &Sides,
 ) -> Vec<Use<D>> {
     let mut sets = UnionFind::new(star.len());
-    let cancels = cosine.is_none_or(|cosine| cosine < -COSINE_OF_SIDES) && has_opposed(star, normal, flat, sides);
-    let two_sided = cancels || star.iter().any(|c| sides.is_two_sided(c.simplex));
+    let two_sided = star.iter().any(|c| sides.is_two_sided(c.simplex));
     for pair in neighbours(mesh, star, flat, sides) {
         let simplices = pair.map(|i| star[i as usize].simplex);
         let [a, b] = simplices.map(normal);
@@ -225,30 +224,6 @@ fn groups<const D: usize>(
 /// Whether two normals point opposite ways.
 fn is_opposed<const D: usize>(a: &Vector64<D>, b: &Vector64<D>) -> bool {
     a.amax() > 0.0 && b.amax() > 0.0 && agree(a, &-b, COSINE_OF_SIDES)
-}
-
-/// Whether two simplices around a point lie in one hyperplane and face opposite ways: the sides of a sheet that is folded
-/// flat, or that two copies make which are cut into simplices in different ways.
-fn has_opposed<const D: usize>(
-    star: &[Corner],
-    normal: &impl Fn(u32) -> Vector64<D>,
-    flat: &impl Fn(u32) -> bool,
-    sides: &Sides,
-) -> bool {
-    let counts = |c: &&Corner| !flat(c.simplex) && sides.leader(c.simplex).is_none();
-    let normals: Vec<Vector64<D>> = star.iter().filter(counts).map(|c| normal(c.simplex)).collect();
-    // Most points have normals that hardly cancel.
-    let (sum, lengths) =
-        normals.iter().fold((Vector64::<D>::zeros(), 0.0), |(sum, lengths), n| (sum + n, lengths + n.norm()));
-    sum.norm() < 0.99 * lengths && (1..normals.len()).any(|i| normals[..i].iter().any(|n| is_opposed(n, &normals[i])))
-}
-
-/// Whether an object has points with simplices in one hyperplane that face opposite ways.
-pub(super) fn has_flat_folds<const D: usize>(mesh: &Mesh<D>, simplices: Range<usize>, sides: &Sides) -> bool {
-    let flat = |s: u32| mesh.degenerate.binary_search(&s).is_ok();
-    let corners = corners(mesh, simplices);
-    let stars: Vec<&[Corner]> = corners.chunk_by(|a, b| a.identity == b.identity).collect();
-    stars.par_iter().any(|star| has_opposed(star, &|s| normal(mesh, &mesh.simplices[s as usize]), &flat, sides))
 }
 
 /// All corners of some simplices, those at one point together.

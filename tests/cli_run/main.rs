@@ -22,6 +22,7 @@ stages:
   - scene:
       objects:
         - name: wall
+          orientation: eye
           simplices:
             vertices: [[-2, -2, -1, -1.3], [2, -2, -1, -1.4], [0, 3, -1, -1.5], [0, 0, 3, -1.3]]
             cells: [[0, 1, 2, 3]]

@@ -63,7 +63,7 @@ fn estimates_are_calibrated<const D: usize>() {
                 );
                 assert!(share >= 0.9, "{name} {sampler:?} {samples}: {share} of {}", differ.len());
                 // Not by saying too much, either.
-                assert!(said < 1.3 * real + 0.3 / f64::from(samples), "{name} {sampler:?} {samples}: {said} {real}");
+                assert!(said < 1.5 * real + 0.3 / f64::from(samples), "{name} {sampler:?} {samples}: {said} {real}");
                 assert!(said > 0.75 * real, "{name} {sampler:?} {samples}: {said} {real}");
             }
         }
