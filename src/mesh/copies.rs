@@ -3,14 +3,18 @@
 //! Files hold them where a surface is listed twice, and where a sheet is to have two sides, each simplex once in either
 //! order. All of them hide the same, so one of them, the *first*, stands for all where rays and what they hit are
 //! concerned; which of two sides is seen is decided by who looks. Their number and their order then decide nothing.
+//!
+//! Flaps of closed bodies are something else: where vertices nearly coincide, rounding folds parts of a body flat, and two of
+//! its simplices lie one on the other, facing opposite ways. They are no sheet; what lies between them is the body's
+//! inside or its outside, and they go on hiding one another.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::Mesh;
-use super::facets::sort_with_parity;
+use super::facets::{sort_with_parity, sorted_facets};
+use super::{Mesh, UnionFind};
 
 /// Which simplices lie on another.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -34,7 +38,17 @@ impl Copies {
             (0..corners.len() as u32).into_par_iter().filter(|&s| counts(s)).map(sorted).collect();
         places.par_sort_unstable();
         let mut copies = Self::default();
-        for place in places.chunk_by(|a, b| a.0 == b.0).filter(|place| place.len() > 1) {
+        let several = || places.chunk_by(|a, b| a.0 == b.0).filter(|place| place.len() > 1);
+        if several().next().is_none() {
+            return copies;
+        }
+        let is_balanced = |place: &[([u32; D], u32)]| {
+            2 * place.iter().filter(|(_, s)| is_odd(corners[*s as usize])).count() == place.len()
+        };
+        let balanced: HashSet<u32> = several().filter(|p| is_balanced(p)).flatten().map(|&(_, s)| s).collect();
+        let bodies = if balanced.is_empty() { Vec::new() } else { bodies(corners, &balanced) };
+        let is_flap = |s: u32| balanced.contains(&s) && bodies[s as usize];
+        for place in several().filter(|place| !is_flap(place[0].1)) {
             let first = place[0].1;
             copies.firsts.extend(place[1..].iter().map(|&(_, s)| [s, first]));
             copies.members.extend(place.iter().map(|&(_, s)| [first, s]));
@@ -79,6 +93,29 @@ impl Copies {
         let before = |end: usize| self.members.partition_point(|&[f, s]| (f, s as usize) < (first, end));
         self.members[before(simplices.start)..before(simplices.end)].iter().map(|pair| pair[1])
     }
+}
+
+/// Whether each simplex belongs to a closed body: to simplices connected by facets, of which every facet is used as often
+/// in one direction as in the other, and not only because all simplices are `balanced`, as a sheet's two sides are.
+fn bodies<const D: usize>(corners: &[[u32; D]], balanced: &HashSet<u32>) -> Vec<bool> {
+    let count = corners.len();
+    let mut sets = UnionFind::new(count);
+    let facets = sorted_facets(corners);
+    let around = || facets.chunk_by(|a, b| a.corners == b.corners);
+    around().flat_map(|facet| facet.windows(2)).for_each(|pair| sets.join(pair[0].simplex, pair[1].simplex));
+    let (mut closed, mut solid) = (vec![true; count], vec![false; count]);
+    for facet in around().filter(|facet| 2 * facet.iter().filter(|f| f.turned).count() != facet.len()) {
+        closed[sets.root(facet[0].simplex) as usize] = false;
+    }
+    for s in (0..count as u32).filter(|s| !balanced.contains(s)) {
+        solid[sets.root(s) as usize] = true;
+    }
+    (0..count as u32)
+        .map(|s| {
+            let root = sets.root(s) as usize;
+            closed[root] && solid[root]
+        })
+        .collect()
 }
 
 /// Whether an odd number of exchanges sorts the corners. Two simplices with the same corners face the same way if they agree
@@ -138,6 +175,21 @@ impl Sides {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn flaps_of_bodies_are_no_sides() {
+        // A tetrahedron's surface, and a flap of two triangles along one of its edges; then the flap alone.
+        let body = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+        let flap = [[0, 1, 4], [1, 0, 4]];
+        let with: Vec<[u32; 3]> = body.into_iter().chain(flap).collect();
+        assert!(Copies::find(&with, |_| true).is_empty());
+        assert_eq!(Copies::find(&flap, |_| true).iter().collect::<Vec<_>>(), [(1, 0)]);
+        // Beside an open sheet the flap is one of two sides; and a body listed twice is one.
+        let open: Vec<[u32; 3]> = body[1..].iter().copied().chain(flap).collect();
+        assert_eq!(Copies::find(&open, |_| true).len(), 1);
+        let twice: Vec<[u32; 3]> = body.into_iter().chain(body).collect();
+        assert_eq!(Copies::find(&twice, |_| true).len(), 4);
+    }
 
     #[test]
     fn places_are_found_whatever_the_order() {
