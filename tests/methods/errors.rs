@@ -48,7 +48,7 @@ fn estimates_are_calibrated<const D: usize>() {
         for sampler in [Sampler::Sobol, Sampler::Random] {
             for samples in [64, 256, 1000, 1024] {
                 let found = against_exact(&scene, &tracer, &exact, 24, |seed| sampling(sampler, samples, seed));
-                let least = if sampler == Sampler::Sobol { 0.4 } else { 1.5 } / samples as f32;
+                let least = if sampler == Sampler::Sobol { 0.3 } else { 1.5 } / samples as f32;
                 assert!(found.iter().all(|(e, _)| e.error >= least && e.rays == samples));
                 let differ: Vec<_> = found.iter().filter(|(e, _)| e.value > 0.0 && e.value < 1.0).collect();
                 assert!(differ.len() >= 20, "{}: only {} values whose rays differ", scene.name, differ.len());
@@ -62,7 +62,7 @@ fn estimates_are_calibrated<const D: usize>() {
                     100.0 * share
                 );
                 // Where every simplex shows all of its silhouette, even rays are hardly more even than random ones.
-                let least = if name.ends_with(".yaml") { 0.95 } else { 0.9 };
+                let least = if name.ends_with(".yaml") { 0.93 } else { 0.9 };
                 let least = if sampler == Sampler::Random { 0.9 } else { least };
                 assert!(share >= least, "{name} {sampler:?} {samples}: {share} of {}", differ.len());
                 // Not by saying too much, either.
