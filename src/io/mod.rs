@@ -6,7 +6,7 @@
 //! | images read | `.vti`, `.raw`, `.nii`, `.tif`, `.nc`, `.nrrd` | [`image`] |
 //! | VTK's files read, as one model | `.vti`, `.vtu`, `.vtp`, legacy `.vtk` | [`vtk`] |
 //! | images written | `.vti`, `.raw`, `.png` | [`vti`], [`raw`], [`png`] |
-//! | meshes and sequences written | `.vtu`, `.pvd` | [`vtu`], [`pvd`] |
+//! | meshes, slices and sequences written | `.vtu`, `.vtp`, `.pvd` | [`vtu`], [`vtp`], [`pvd`] |
 //! | figures for ParaView written | a script that finds its images beside itself | [`paraview`] |
 //!
 //! Every writer works over any `Write`, so it can be tested in memory; [`AtomicFile`] is the one place that opens
@@ -16,6 +16,7 @@
 mod atomic;
 mod error;
 pub mod image;
+mod inline;
 mod input;
 pub mod mesh;
 pub mod paraview;
@@ -24,6 +25,7 @@ pub mod pvd;
 pub mod raw;
 pub mod vti;
 pub mod vtk;
+pub mod vtp;
 pub mod vtu;
 mod xml;
 
