@@ -165,7 +165,7 @@ impl Stage for SlicePlan {
         }
         let values = occlusion.and_then(|occlusion| scene.values.get(&occlusion)).map(|values| &**values);
         let mesh = scene.session.mesh();
-        let (mut faces, mut met) = (0, false);
+        let mut faces = 0;
         for &i in &stale {
             let file = &files[i];
             let normal = Vector64::<D>::from_fn(|r, _| normal[r]);
@@ -173,12 +173,9 @@ impl Stage for SlicePlan {
             let Some(plane) = Hyperplane::new(normal, places[i]) else { continue };
             let found = section(mesh, &plane, values.map(|values| &*values.values));
             faces += found.faces.len();
-            met |= !found.faces.is_empty();
             let mut notes = Vec::new();
-            let (last, all) = (i == files.len() - 1, stale.len() == files.len());
-            if last && all && !met {
-                let what = if list.is_some() { "no hyperplane of the sequence" } else { "the hyperplane" };
-                notes.push(format!("{}: {what} meets anything; nothing is in it", plan.id(me)));
+            if found.faces.is_empty() && list.is_none() {
+                notes.push(format!("{}: the hyperplane meets nothing; the file is empty", plan.id(me)));
             }
             let bytes = write(&plan.out.join(file), run.told, mesh, &plane, &found, values)?;
             run.made(file, bytes, notes)?;
