@@ -904,7 +904,7 @@ fn slices_of_cubes_through_their_corners() {
                 assert!(!apart, "{axis} {sign} {at}: {sizes:?}");
             }
         }
-        for normal in [[1.0, 1.0, 0.0, 0.0], [1.0, -1.0, 1.0, 0.0], [1.0; 4]] {
+        for normal in [[1.0f64, 1.0, 0.0, 0.0], [1.0, -1.0, 1.0, 0.0], [1.0; 4]] {
             let most = normal[..D].iter().map(|x| x.abs() / 2.0).sum::<f64>();
             for at in [most, -most] {
                 assert_eq!(section(mesh, &hyperplane::<D>(normal, at), None), Section::default(), "{normal:?} {at}");
