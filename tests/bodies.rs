@@ -633,7 +633,7 @@ fn slices_are_files() {
   - slice: {id: past, at: 3, vtp: past.vtp}
 ";
     let notes = run_stages(out, stages).unwrap();
-    assert_eq!(notes, ["past.vtp: past: the hyperplane meets nothing; the file is empty"]);
+    assert_eq!(notes, ["past: the hyperplane meets nothing; the file is empty"]);
     let one = read_mesh(&out.join("one.vtp"));
     let (position, object) = (array(&one, "position"), array(&one, "object"));
     for ((point, position), object) in one.points.iter().zip(position.chunks(4)).zip(object) {
@@ -685,7 +685,7 @@ fn wireframes_are_seen_by_the_render_s_camera() {
   - wireframe: {vtp: away.vtp}
 ";
     let notes = run_stages(out, stages).unwrap();
-    assert_eq!(notes, ["away.vtp: wireframe-4: all edges are behind the eye, or nearer than `near`"]);
+    assert_eq!(notes, ["wireframe-4: all edges are behind the eye, or nearer than `near`"]);
     // The default camera's image axes are x, y and z; it looks along -w.
     let check = |file: &str, eye: f64, perspective: bool, lines: usize| {
         let mesh = read_mesh(&out.join(file));
