@@ -24,8 +24,10 @@ stages:
   - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
   - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
   - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, camera: {projection: parallel, height: 2}}
+  - render: {id: mended, occlusion: o2, dimensions: [3, 4, 5], shading: auto}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
+  - write: {id: w3, input: mended, vti: c.vti}
   - mesh: {id: m, input: s, occlusion: none, vtu: m.vtu}
   - slice: {id: c, input: s, occlusion: none, normal: [0, 0, 0, 1], at: 0.1, vtp: c.vtp}
   - slice: {id: cs, input: s, occlusion: none, range: [0, 1], count: 3, vtp: cs.vtp}
@@ -63,6 +65,7 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("RenderSpec.dimensions", Ok("r.dimensions=[3, 4, 6]")),
     ("RenderSpec.shading", Ok("r.shading=flat")),
     ("RenderSpec.denoise", Ok("parallel.denoise=false")),
+    ("RenderSpec.tolerance", Ok("mended.tolerance=0.03")),
     ("RenderSpec.supersample", Ok("parallel.supersample=2")),
     ("RenderSpec.dilate", Ok("parallel.dilate=2")),
     ("RenderSpec.visibility", Err("changes the time, never the image")),

@@ -16,8 +16,8 @@
 //! sets that factor would be 1, and the error itself larger, measured 1.3 to 1.5 times at 256 rays: the values would be
 //! made worse for the sake of their error bars. Of independent rays each is a group of its own.
 //!
-//! Few groups scatter less than they should now and then, and where all agree there is no scatter, and yet no certainty. So
-//! no estimate is below what is to be expected of so many even rays at a place of that value, half a ray the other way
+//! Few groups scatter less than they should now and then: as in Student's distribution, the variance is taken (R - 1)/(R - 3) times.
+//! And where all agree there is no scatter, and yet no certainty. So no estimate is below what is to be expected of so many even rays at a place of that value, half a ray the other way
 //! added: about 0.5/N where all agree. Of independent rays, none out of N going the other way means, at 95 %, a share below
 //! 3/N (the rule of three), which are two standard errors of 1.5/N: no estimate is below that.
 
@@ -57,7 +57,7 @@ impl Target {
     /// Whether the rays so far are enough.
     pub(crate) fn is_met(&self, accumulator: &Accumulator) -> bool {
         let rays = accumulator.rays();
-        rays >= Self::FEWEST && rays.is_power_of_two() && accumulator.error() <= f64::from(self.error)
+        rays >= Self::FEWEST && rays.is_power_of_two() && accumulator.cautious_error() <= f64::from(self.error)
     }
 }
 
@@ -132,12 +132,24 @@ impl Accumulator {
         let variance = match self.even_in {
             None => self.variance_of_rays().max(bound(self.rays()).powi(2)),
             Some(dimension) => {
-                let groups = self.variance_of_groups() * libm::pow(self.groups(), -1.0 / dimension.pick(2.0, 3.0));
+                let count = self.groups();
+                let student = (count.max(LEAST_GROUPS as f64) - 1.0) / (count.max(LEAST_GROUPS as f64) - 3.0);
+                let groups = self.variance_of_groups() * student * libm::pow(count, -1.0 / dimension.pick(2.0, 3.0));
                 let value = (f64::from(self.escaped()) + 0.5) / (rays + 1.0);
                 groups.max(noise::of_even_rays(dimension, value, rays))
             }
         };
         variance.sqrt().min(1.0)
+    }
+
+    /// A standard error to stop by. Whoever stops as soon as an error is small enough stops at the luckiest, so groups count
+    /// as if they were independent, and agreement as of independent rays.
+    pub fn cautious_error(&self) -> f64 {
+        let variance = match self.even_in {
+            None => self.variance_of_rays(),
+            Some(_) => self.variance_of_groups(),
+        };
+        variance.sqrt().max(bound(self.rays())).min(1.0).max(self.error())
     }
 
     /// How many groups there are, the unfinished one in part.
@@ -170,7 +182,7 @@ impl Accumulator {
     }
 }
 
-/// What no estimate of so many independent rays is below.
+/// What no estimate of so many independent rays is below: the rule of three.
 fn bound(rays: u32) -> f64 {
     1.5 / f64::from(rays)
 }
@@ -210,7 +222,8 @@ mod tests {
             let mean = means.iter().sum::<f64>() / n;
             let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
             let groups = f64::from(count) / size as f64;
-            let expected = (variance * n / groups).sqrt() * groups.powf(-1.0 / 6.0);
+            let student = (groups.max(8.0) - 1.0) / (groups.max(8.0) - 3.0);
+            let expected = (variance * n / groups * student).sqrt() * groups.powf(-1.0 / 6.0);
             let value = (f64::from(found.escaped()) + 0.5) / f64::from(count + 1);
             let expected = expected.max(noise::of_even_rays(Dimension::Four, value, count.into()).sqrt());
             assert!((found.error() - expected.min(1.0)).abs() < 1e-12, "{count}: {} {expected}", found.error());

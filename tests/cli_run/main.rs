@@ -22,6 +22,7 @@ stages:
   - scene:
       objects:
         - name: wall
+          orientation: eye
           simplices:
             vertices: [[-2, -2, -1, -1.3], [2, -2, -1, -1.4], [0, 3, -1, -1.5], [0, 0, 3, -1.3]]
             cells: [[0, 1, 2, 3]]
@@ -31,7 +32,7 @@ stages:
   - occlusion: {id: ao, samples: 8, file: ao.f32}
   - render: {id: plain, occlusion: none, dimensions: [7, 6, 5]}
   - write: {vti: plain.vti}
-  - render: {id: image, dimensions: [7, 6, 5]}
+  - render: {id: image, dimensions: [7, 6, 5], shading: smooth}
   - write: {id: files, vti: image.vti, raw: image.raw, vtu: scene.vtu, png: slices.png}
   - paraview: {state: figure.py, screenshot: figure.png}
 ";

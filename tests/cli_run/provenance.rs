@@ -32,7 +32,16 @@ fn every_file_tells_the_pipeline_that_makes_them_all_again() {
   - mesh: {vtu: mesh.vtu}
 ";
     let folder = Folder::with(&(PIPELINE.to_owned() + more));
-    let sets = ["--set", "ao.samples=5", "--set", "image.camera={eye: [0, 0.1, 0, 1.5]}", "--set", "plain.dilate=1"];
+    let sets = [
+        "--set",
+        "ao.samples=5",
+        "--set",
+        "image.camera={eye: [0, 0.1, 0, 1.5]}",
+        "--set",
+        "plain.dilate=1",
+        "--set",
+        "image.shading=",
+    ];
     folder.runs(&sets);
     let out = folder.path("out/small");
     let made = contents(&out);
