@@ -4,9 +4,14 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use ao4d::geometry::{Vector64, normal_of};
-use ao4d::mesh::Surface;
+use ao4d::geometry::{Dimension, Vector, Vector64, normal_of};
+use ao4d::io::vtk;
+use ao4d::mesh::edges::{Edges, edges};
+use ao4d::mesh::section::{Hyperplane, Section, section};
 use ao4d::mesh::topology::{corners, enclosed_volume, facet_pairs, singular_vertices, surface_measure, worst_quality};
+use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::pipeline::{self, Document, Pipeline, Settings};
+use ao4d::progress::Silent;
 use ao4d::scene::{ObjectSpec, build_object};
 use serde_json::{Value, json};
 
@@ -595,4 +600,507 @@ fn meshes_from_obj_msh_and_vtk() {
         let found = extruded(name).unwrap_err().to_string();
         assert!(found.contains(message) && found.contains(name), "{found}");
     }
+}
+
+/// Runs the stages of a pipeline in a folder; tells what is noted.
+fn run_stages(folder: &Path, stages: &str) -> Result<Vec<String>, String> {
+    let document = Document::parse("p.yaml", &format!("name: p\nstages:\n{stages}")).map_err(|e| e.to_string())?;
+    let pipeline = Pipeline::from_document(document, &[], Some(folder.to_owned())).map_err(|e| e.to_string())?;
+    let report = pipeline::run(&pipeline, &Settings::default(), &Silent).map_err(|e| e.to_string())?;
+    Ok(report.notes)
+}
+
+fn read_mesh(file: &Path) -> vtk::UnstructuredGrid {
+    match vtk::read(file).unwrap() {
+        vtk::DataSet::Unstructured(mesh) => mesh,
+        vtk::DataSet::Image(_) => panic!("{}: an image", file.display()),
+    }
+}
+
+fn array(mesh: &vtk::UnstructuredGrid, name: &str) -> Vec<f64> {
+    mesh.point_array(name).unwrap_or_else(|| panic!("no {name}")).values.to_f64()
+}
+
+#[test]
+fn slices_are_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let stages = "  - scene: {id: s, objects: [{tesseract: {size: 2, subdivisions: 2}}, {tesseract: {size: 1}, transform: [{translate: [2, 0, 0, 0]}]}]}
+  - occlusion: {id: o, samples: 16, file: o.f32}
+  - slice: {id: one, at: 0.25, vtp: one.vtp}
+  - slice: {id: open, normal: [0, 0, 2, 0], at: 1, occlusion: none, vtp: open.vtp}
+  - slice: {id: many, normal: [1, 0, 0, 0], range: [-0.5, 2.25], count: 12, vtp: in/many.vtp}
+  - slice: {id: past, at: 3, vtp: past.vtp}
+";
+    let notes = run_stages(out, stages).unwrap();
+    assert_eq!(notes, ["past: the hyperplane meets nothing; the file is empty"]);
+    let one = read_mesh(&out.join("one.vtp"));
+    let (position, object) = (array(&one, "position"), array(&one, "object"));
+    for ((point, position), object) in one.points.iter().zip(position.chunks(4)).zip(object) {
+        assert_eq!((point[..].to_vec(), position[3]), (position[..3].to_vec(), 0.25));
+        assert_eq!(object, if point[0] > 1.2 { 2.0 } else { 1.0 });
+    }
+    let (values, errors) = (array(&one, "ambient_occlusion"), array(&one, "occlusion_error"));
+    assert!(values.iter().any(|&v| v == 1.0) && values.iter().any(|&v| v < 0.95));
+    assert!(values.iter().all(|v| (0.0..=1.0).contains(v)) && errors.iter().all(|&e| (0.0..0.2).contains(&e)));
+    let info = ao4d::inspect::surface::SurfaceSummary::of(&one).unwrap();
+    assert!(info.closed && info.oriented && info.manifold && info.components == 2, "{info:?}");
+    near(info.enclosed_volume.unwrap(), 9.0, 1e-6);
+    // n = (0, 0, 2, 0) and c = 1: z = 1/2, along a facet of the smaller one.
+    let open = read_mesh(&out.join("open.vtp"));
+    assert!(open.point_array("ambient_occlusion").is_none());
+    assert!(array(&open, "position").chunks(4).all(|p| p[2] == 0.5));
+    near(ao4d::inspect::surface::SurfaceSummary::of(&open).unwrap().enclosed_volume.unwrap(), 9.0, 1e-6);
+    let list = std::fs::read_to_string(out.join("in/many.pvd")).unwrap();
+    for (i, expected) in [8.0, 8.0, 8.0, 8.0, 8.0, 8.0, 8.0, 0.0, 0.0, 1.0, 1.0, 1.0].into_iter().enumerate() {
+        let name = format!("many-{i:02}.vtp");
+        let at = -0.5 + 0.25 * i as f64;
+        assert!(list.contains(&format!("timestep=\"{at:?}\" group=\"\" part=\"0\" file=\"{name}\"")), "{list}");
+        let slice = read_mesh(&out.join("in").join(name));
+        let volume = ao4d::inspect::surface::SurfaceSummary::of(&slice).map_or(0.0, |s| s.enclosed_volume.unwrap());
+        // x = 1 is along a facet of one, x = 3/2 along one of the other, which begins there.
+        assert!((volume - expected).abs() < 1e-6, "{at}: {volume}");
+    }
+    // A slice of a 3D scene is an outline.
+    let three =
+        "  - scene: {dimension: 3, objects: [{sphere: {radius: 1, subdivisions: 4}}]}\n  - slice: {vtp: flat.vtp}\n";
+    run_stages(&out.join("three"), three).unwrap();
+    let flat = read_mesh(&out.join("three/flat.vtp"));
+    assert!(flat.cells().all(|(kind, points)| kind == 3 && points.len() == 2) && flat.cells().count() > 8);
+    assert!(array(&flat, "position").chunks(3).zip(&flat.points).all(|(p, q)| p == [q[0], q[1], 0.0] && q[2] == 0.0));
+}
+
+#[test]
+fn wireframes_are_seen_by_the_render_s_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let stages = "  - scene: {id: s, objects: [{tesseract: {size: 2}, transform: [{rotate: {plane: xw, degrees: 30}}, {translate: [0.1, 0.2, 0.3, -2]}]}]}
+  - render: {id: r, occlusion: none, dimensions: [2, 2, 2], camera: {eye: [0, 0, 0, 2], target: [0, 0, 0, 0]}}
+  - wireframe: {vtp: far.vtp}
+  - render: {id: within, occlusion: none, dimensions: [2, 2, 2], camera: {eye: [0, 0, 0, -2], target: [0, 0, 0, -4]}}
+  - wireframe: {near: 0.125, vtp: near.vtp}
+  - render: {id: flat, occlusion: none, dimensions: [2, 2, 2], camera: {eye: [0, 0, 0, 2], projection: parallel}}
+  - wireframe: {input: flat, edges: all, vtp: all.vtp}
+  - render: {id: away, occlusion: none, dimensions: [2, 2, 2], camera: {eye: [0, 0, 0, 2], target: [0, 0, 0, 4]}}
+  - wireframe: {vtp: away.vtp}
+";
+    let notes = run_stages(out, stages).unwrap();
+    assert_eq!(notes, ["wireframe-4: all edges are behind the eye, or nearer than `near`"]);
+    // The default camera's image axes are x, y and z; it looks along -w.
+    let check = |file: &str, eye: f64, perspective: bool, lines: usize| {
+        let mesh = read_mesh(&out.join(file));
+        assert_eq!(mesh.cells().count(), lines, "{file}");
+        let (position, w, depth) = (array(&mesh, "position"), array(&mesh, "w"), array(&mesh, "depth"));
+        let mut nearest = f64::INFINITY;
+        for (i, p) in position.chunks(4).enumerate() {
+            let distance = eye - p[3];
+            nearest = nearest.min(distance);
+            let scale = if perspective { 1.0 / distance } else { 1.0 };
+            (0..3).for_each(|a| assert!((mesh.points[i][a] - p[a] * scale).abs() < 1e-5 * scale.max(1.0), "{file}"));
+            let away = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + distance * distance).sqrt();
+            assert!((depth[i] - if perspective { away } else { distance }).abs() < 1e-5 && w[i] == p[3]);
+        }
+        (mesh, nearest)
+    };
+    let (_, nearest) = check("far.vtp", 2.0, true, 32);
+    assert!(nearest > 1.0);
+    // From within: of the 32 edges those wholly behind the eye are gone, and those that pass it end before it.
+    let corners = |k: u32| {
+        let c: [f64; 4] = std::array::from_fn(|i| if k >> i & 1 == 1 { 1.0 } else { -1.0 });
+        c[0] * 0.5 + c[3] * (PI / 6.0).cos()
+    };
+    let edges = (0..16u32).flat_map(|k| (0..4).filter(move |i| k >> i & 1 == 0).map(move |i| (k, k | 1 << i)));
+    let seen = edges.filter(|&(a, b)| -corners(a) >= 0.125 || -corners(b) >= 0.125).count();
+    let (mesh, nearest) = check("near.vtp", -2.0, true, seen);
+    assert!(seen < 32 && (nearest - 0.125).abs() < 1e-6 && mesh.points.len() > 8, "{seen} {nearest}");
+    check("all.vtp", 2.0, false, edges_of_a_tesseract());
+}
+
+/// Of a tesseract whose 8 cubes are 6 tetrahedra each: V - E + F - T = 0 and F = 2 T.
+fn edges_of_a_tesseract() -> usize {
+    let tetrahedra = build::<4>(json!({"tesseract": {"size": 2}})).simplices.len();
+    16 + tetrahedra
+}
+
+#[test]
+fn slices_and_wireframes_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let four = "  - scene: {id: s, objects: [{tesseract: {size: 1}}]}\n";
+    for (stage, message) in [
+        (
+            "slice: {vtp: a.vtp, normal: [0, 0, 0, 0]}",
+            "normal: the normal is zero, and no hyperplane has that; try `normal: [0, 0, 0, 1]`",
+        ),
+        ("slice: {vtp: a.vtp, normal: [0, 0, 1]}", "normal: expected 4 numbers (the scene is 4D), found 3"),
+        ("slice: {vtp: a.vtp, normal: [0, 0, 1, 1e13]}", "normal[3]: expected a number of size up to 1e12, found 1e13"),
+        ("slice: {vtp: a.vtu}", "vtp: expected a name that ends in .vtp, found \"a.vtu\""),
+        ("slice: {vtp: a.vtp, at: 1e13}", "at: expected a number of size up to 1e12, found 1e13"),
+        (
+            "slice: {vtp: a.vtp, at: 0, range: [0, 1], count: 3}",
+            "at: `at` is for one slice, `range` and `count` for several; take one of them out",
+        ),
+        ("slice: {vtp: a.vtp, range: [0, 1]}", "range: a range needs the number of its slices: add `count`"),
+        ("slice: {vtp: a.vtp, count: 3}", "count: so many slices need a `range: [FIRST, LAST]`"),
+        (
+            "slice: {vtp: a.vtp, range: [0, 1], count: 1}",
+            "count: expected 2 to 10000 slices, found 1; for one, say `at` instead",
+        ),
+        (
+            "slice: {vtp: a.vtp, range: [1, 1], count: 2}",
+            "range: the range begins and ends at 1; for one slice, say `at`",
+        ),
+        ("wireframe: {vtp: a.vtp}", "there is no earlier `render` whose camera it could look through; put one first"),
+        (
+            "render: {dimensions: [1, 1, 1]}\n  - wireframe: {vtp: a.vtp, angle: 190}",
+            "angle: expected 0 to 180 degrees, found 190",
+        ),
+        (
+            "render: {dimensions: [1, 1, 1]}\n  - wireframe: {vtp: a.vtp, near: 0}",
+            "near: expected a number above 0, found 0",
+        ),
+    ] {
+        let error = run_stages(folder.path(), &format!("{four}  - {stage}\n")).expect_err(stage);
+        assert!(error.contains(message), "{stage}: {error}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written");
+}
+
+/// An object as a scene of its own.
+fn mesh_of<const D: usize>(object: Value) -> Mesh<D> {
+    let mut builder = MeshBuilder::new();
+    let crease = Crease::Above(30.0);
+    builder.add_creased("body", [1.0; 3], &build::<D>(object), Orientation::Input, crease).unwrap();
+    builder.finish()
+}
+
+fn hyperplane<const D: usize>(normal: [f64; 4], at: f64) -> Hyperplane<D> {
+    Hyperplane::new(Vector64::from_fn(|r, _| normal[r]), at).unwrap()
+}
+
+/// A cube or tesseract of edge 1 around the origin.
+fn cube<const D: usize>(pieces: u32) -> Mesh<D> {
+    mesh_of(json!({"box": {"min": vec![-0.5; D], "max": vec![0.5; D], "subdivisions": pieces}}))
+}
+
+/// The points of a section within its hyperplane, in both dimensions.
+fn section_points<const D: usize>(mesh: &Mesh<D>, plane: &Hyperplane<D>, found: &Section) -> Vec<[f64; 3]> {
+    found.points.iter().map(|point| plane.coordinates(&point.position(mesh))).collect()
+}
+
+/// Whether a section has no rim: in 3D as many lines begin at each point as end there.
+fn is_closed<const D: usize>(found: &Section) -> bool {
+    match Dimension::of::<D>() {
+        Dimension::Four => facet_pairs(&found.faces).is_closed(),
+        Dimension::Three => {
+            let mut surplus = vec![0; found.points.len()];
+            for &[from, to, _] in &found.faces {
+                (surplus[from as usize], surplus[to as usize]) = (surplus[from as usize] + 1, surplus[to as usize] - 1);
+            }
+            surplus.iter().all(|&surplus| surplus == 0)
+        }
+    }
+}
+
+/// The measure of a section, and what it encloses: length and area in 3D, area and volume in 4D.
+fn section_sizes<const D: usize>(mesh: &Mesh<D>, plane: &Hyperplane<D>, found: &Section) -> [f64; 2] {
+    let points = section_points(mesh, plane, found);
+    match Dimension::of::<D>() {
+        Dimension::Four => {
+            let points: Vec<Vector64<3>> = points.iter().map(|&p| p.into()).collect();
+            let triangles = || corners(&points, &found.faces);
+            [surface_measure(triangles()), enclosed_volume(triangles())]
+        }
+        Dimension::Three => {
+            let ends = found.faces.iter().map(|face| (points[face[0] as usize], points[face[1] as usize]));
+            let sum = |f: &dyn Fn([f64; 3], [f64; 3]) -> f64| ends.clone().map(|(p, q)| f(p, q)).sum::<f64>();
+            let length = sum(&|p, q| (p[0] - q[0]).hypot(p[1] - q[1]));
+            [length, sum(&|p, q| (p[0] * q[1] - p[1] * q[0]) / 2.0)]
+        }
+    }
+}
+
+#[test]
+fn slices_of_balls_are_balls() {
+    fn check<const D: usize>(object: Value) {
+        let mesh = mesh_of::<D>(object);
+        for (normal, at) in [
+            ([0.0, 0.0, 1.0, 0.0], 0.3),
+            ([0.0, 1.0, 0.0, 0.0], 0.0),
+            ([-1.0, 0.0, 0.0, 0.0], -0.7),
+            ([0.6, 0.0, -0.8, 0.0], 0.25),
+            ([0.5, -0.5, 0.5, 0.5], -0.4),
+        ] {
+            let plane = hyperplane::<D>(normal, at);
+            let found = section(&mesh, &plane, None);
+            assert!(is_closed::<D>(&found), "{normal:?}");
+            if D == 4 {
+                assert!(facet_pairs(&found.faces).is_manifold(), "{normal:?}");
+                let f_vector = ao4d::mesh::topology::f_vector(&found.faces);
+                assert_eq!(f_vector[0] + f_vector[2], f_vector[1] + 2, "Euler characteristic 2");
+            }
+            // A hyperplane n.x = c is |c| / |n| from the origin.
+            let length = normal[..D].iter().map(|x| x * x).sum::<f64>().sqrt();
+            let radius = (1.0 - (at / length).powi(2)).sqrt();
+            let expected = Dimension::of::<D>().pick(
+                [2.0 * PI * radius, PI * radius.powi(2)],
+                [4.0 * PI * radius.powi(2), 4.0 / 3.0 * PI * radius.powi(3)],
+            );
+            for (size, expected) in section_sizes(&mesh, &plane, &found).into_iter().zip(expected) {
+                assert!(size < expected, "it lies within the ball: {size}, {expected}");
+                near(size, expected, 0.03);
+            }
+            for point in &found.points {
+                let place = point.position(&mesh);
+                let height = place.iter().zip(normal).map(|(x, n)| x * n).sum::<f64>() - at;
+                assert!(height.abs() < 1e-12, "{height}");
+                // Faces look outwards, and points are where they were in space.
+                assert!((0.97..=1.0 + 1e-6).contains(&place.norm()));
+            }
+        }
+        let beyond = hyperplane::<D>([1.0, 0.0, 0.0, 0.0], 1.5);
+        assert_eq!(section(&mesh, &beyond, None), Section::default());
+    }
+    check::<3>(json!({"sphere": {"radius": 1, "subdivisions": 24}}));
+    check::<4>(json!({"hypersphere": {"radius": 1, "subdivisions": 14}}));
+}
+
+#[test]
+fn slices_of_cubes_through_their_corners() {
+    // Across a long diagonal, through the middle: a regular hexagon, a regular octahedron. Both go through corners.
+    for pieces in [1, 2, 3] {
+        let (square, tesseract) = (cube::<3>(pieces), cube::<4>(pieces));
+        let plane = hyperplane::<3>([1.0; 4], 0.0);
+        let [length, area] = section_sizes(&square, &plane, &section(&square, &plane, None));
+        near(length, 6.0 * 0.5f64.sqrt(), 1e-12);
+        near(area, 3.0 * 3f64.sqrt() / 4.0, 1e-12);
+        let plane = hyperplane::<4>([1.0; 4], 0.0);
+        let found = section(&tesseract, &plane, None);
+        let [area, volume] = section_sizes(&tesseract, &plane, &found);
+        near(area, 4.0 * 3f64.sqrt(), 1e-12);
+        near(volume, 4.0 / 3.0, 1e-12);
+        let pairs = facet_pairs(&found.faces);
+        assert!(pairs.is_manifold() && pairs.is_closed(), "{pairs:?}");
+    }
+    // Along facets of the body and of its pieces a slice is that just below; what only touches from above, or with less
+    // than a facet, is nothing.
+    fn check<const D: usize>(mesh: &Mesh<D>) {
+        let one = Dimension::of::<D>().pick(4.0, 6.0);
+        for axis in 0..D {
+            let along: [f64; 4] = std::array::from_fn(|i| f64::from(i == axis));
+            for (sign, at, full) in [
+                (1.0, 0.5, true),
+                (1.0, 0.0, true),
+                (1.0, -0.5, false),
+                (-1.0, 0.5, true),
+                (1.0, 0.5f64.next_up(), false),
+                (1.0, (-0.5f64).next_up(), true),
+            ] {
+                let plane = hyperplane::<D>(along.map(|x| x * sign), at);
+                let found = section(mesh, &plane, None);
+                let sizes = section_sizes(mesh, &plane, &found);
+                assert!(is_closed::<D>(&found));
+                let expected = if full { [one, 1.0] } else { [0.0; 2] };
+                let apart = sizes.iter().zip(expected).any(|(size, expected)| (size - expected).abs() > 1e-12);
+                assert!(!apart, "{axis} {sign} {at}: {sizes:?}");
+            }
+        }
+        for normal in [[1.0f64, 1.0, 0.0, 0.0], [1.0, -1.0, 1.0, 0.0], [1.0; 4]] {
+            let most = normal[..D].iter().map(|x| x.abs() / 2.0).sum::<f64>();
+            for at in [most, -most] {
+                assert_eq!(section(mesh, &hyperplane::<D>(normal, at), None), Section::default(), "{normal:?} {at}");
+            }
+        }
+    }
+    for pieces in [1, 2, 4] {
+        check(&cube::<3>(pieces));
+        check(&cube::<4>(pieces));
+    }
+}
+
+#[test]
+fn slices_add_up_to_the_body() {
+    fn check<const D: usize>(object: Value) {
+        let mesh = mesh_of::<D>(object.clone());
+        let body = volume(&build::<D>(object.clone()));
+        for normal in [[0.0, 0.0, 1.0, 0.0], [0.5, 0.5, -0.5, 0.5], [0.36, 0.48, 0.8, 0.0]] {
+            let unit = Vector64::<D>::from_fn(|r, _| normal[r]).normalize();
+            let normal: [f64; 4] = std::array::from_fn(|i| unit.get(i).copied().unwrap_or(0.0));
+            let (steps, reach) = (240, 3.0);
+            let width = 2.0 * reach / f64::from(steps);
+            let sum: f64 = (0..steps)
+                .map(|i| {
+                    let plane = hyperplane::<D>(normal, -reach + (f64::from(i) + 0.5) * width);
+                    let found = section(&mesh, &plane, None);
+                    assert!(is_closed::<D>(&found), "{object} {normal:?}");
+                    section_sizes(&mesh, &plane, &found)[1] * width
+                })
+                .sum();
+            near(sum, body, 0.01);
+        }
+    }
+    let notch = |d: usize| {
+        let cuts = json!([{"from": vec![0; d], "to": vec![2; d]}]);
+        json!({"cut_cube": {"min": vec![-1; d], "max": vec![1; d], "cuts": cuts}})
+    };
+    check::<3>(notch(3));
+    check::<4>(notch(4));
+    check::<4>(json!({"polytope": {"cells": 24}}));
+    check::<4>(json!({"duoprism": {"sides": [5, 3], "radii": [1, 1]}}));
+    check::<3>(isosurface(json!({"torus": {"major": 1, "minor": 0.4}}), 12));
+    check::<4>(isosurface(json!({"tiger": {"major": [1.0, 1.2], "minor": 0.5}}), 10));
+}
+
+#[test]
+fn slices_through_many_corners_at_once_are_closed() {
+    // Whole numbers as coordinates and as hyperplanes: vertices, edges and simplices lie in them all the time.
+    fn check<const D: usize>(object: Value) {
+        let mesh = mesh_of::<D>(object.clone());
+        let (mut cut, mut through) = (0, 0);
+        for code in 0..3u32.pow(D as u32) {
+            let normal: [f64; 4] = std::array::from_fn(|i| f64::from(code / 3u32.pow(i as u32) % 3) - 1.0);
+            if normal[..D].iter().all(|&x| x == 0.0) {
+                continue;
+            }
+            for at in -4..=4 {
+                let plane = hyperplane::<D>(normal, f64::from(at));
+                let found = section(&mesh, &plane, None);
+                assert!(is_closed::<D>(&found), "{object} {normal:?} {at}");
+                // The limit of those below.
+                let below = hyperplane::<D>(normal, f64::from(at) - 1e-6);
+                let sizes = [&plane, &below].map(|plane| section_sizes(&mesh, plane, &section(&mesh, plane, None))[1]);
+                assert!((sizes[0] - sizes[1]).abs() < 1e-3, "{object} {normal:?} {at}: {sizes:?}");
+                cut += usize::from(!found.faces.is_empty());
+                through += usize::from(found.points.iter().any(|point| point.from == point.to));
+            }
+        }
+        assert!(cut > 50 && through > 50, "{cut} {through}");
+    }
+    check::<3>(json!({"box": {"min": [-2, -2, -2], "max": [2, 2, 2], "subdivisions": 4}}));
+    check::<4>(json!({"box": {"min": [-2, -2, -2, -2], "max": [2, 2, 2, 2], "subdivisions": 2}}));
+    let cuts = json!([{"from": [0, -1, -1, -1], "to": [3, 1, 3, 3]}]);
+    check::<4>(json!({"cut_cube": {"min": [-2, -2, -2, -2], "max": [2, 2, 2, 2], "cuts": cuts, "subdivisions": 4}}));
+}
+
+#[test]
+fn values_go_along_and_creases_stay_sharp() {
+    fn check<const D: usize>() {
+        let mesh = cube::<D>(3);
+        let plane = hyperplane::<D>([0.3, -0.5, 0.7, 0.2], 0.1);
+        // What is linear in space is so on the slice.
+        let linear = |x: f64, y: f64| 0.5 + 0.25 * x - 0.125 * y;
+        let values: Vec<f32> = mesh.vertices.iter().map(|v| linear(f64::from(v[0]), f64::from(v[1])) as f32).collect();
+        let found = section(&mesh, &plane, Some(&values));
+        assert_eq!(found, section(&mesh, &plane, None), "where values agree, points are one");
+        for point in &found.points {
+            let place = point.position(&mesh);
+            assert!((f64::from(point.value(&values)) - linear(place[0], place[1])).abs() < 1e-6);
+            let error = point.error(&vec![0.5; mesh.vertices.len()]);
+            let expected = 0.5 * (1.0 - point.share).hypot(point.share);
+            assert!((f64::from(error) - expected).abs() < 1e-6);
+        }
+        // Each face of the box has a value of its own, and so has each face of the slice.
+        let sides: Vec<f32> = (mesh.normals.iter())
+            .map(|n| n.iter().enumerate().map(|(i, x)| x * (i + 1) as f32).sum::<f32>().round())
+            .collect();
+        let split = section(&mesh, &plane, Some(&sides));
+        assert!(split.points.len() > found.points.len() && split.faces.len() == found.faces.len());
+        for face in &split.faces {
+            let on_face: Vec<f32> = face[..D - 1].iter().map(|&p| split.points[p as usize].value(&sides)).collect();
+            assert!(on_face.iter().all(|&value| value == on_face[0]), "{on_face:?}");
+        }
+        // The points of both sides are at the same place to the last bit, so that it closes when they are welded.
+        let places = |found: &Section| -> Vec<Vec<u32>> {
+            let bits = |p: &[f64; 3]| p.iter().map(|x| (*x as f32).to_bits()).collect();
+            let mut places: Vec<Vec<u32>> = section_points(&mesh, &plane, found).iter().map(bits).collect();
+            places.sort_unstable();
+            places.dedup();
+            places
+        };
+        assert_eq!(places(&split), places(&found));
+    }
+    check::<3>();
+    check::<4>();
+}
+
+#[test]
+fn signs_of_heights_are_exact() {
+    // 0.1 + 0.2 - 0.3 in exact arithmetic on what is stored, by fractions.
+    let point = Vector::<4>::from([0.1, 0.2, 1.0, 0.0]);
+    let plane = hyperplane::<4>([1.0, 1.0, -1.0, 0.0], f64::from(0.1f32) + f64::from(0.2f32) - 1.0);
+    assert_eq!(plane.height(&point), 0.0);
+    for (i, next) in [(0, 0.1f32.next_up()), (1, 0.2f32.next_down())] {
+        let mut moved = point;
+        moved[i] = next;
+        assert_eq!(plane.height(&moved).signum(), f64::from(next - point[i]).signum());
+    }
+    // Whole numbers of 53 and 24 bits, in 128-bit arithmetic; the hyperplane is as near to the point as a double tells.
+    let mut state = 7u64;
+    let mut random = |bits: u32| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        i128::from(state >> (64 - bits)) - (1i128 << (bits - 1))
+    };
+    let mut signs = [0; 3];
+    for _ in 0..2000 {
+        let (n, x): ([i128; 4], [i128; 4]) = (std::array::from_fn(|_| random(54)), std::array::from_fn(|_| random(25)));
+        let sum: i128 = n.iter().zip(&x).map(|(n, x)| n * x).sum();
+        let at = sum as f64;
+        let expected = (sum - at as i128).signum();
+        let plane = hyperplane::<4>(n.map(|n| n as f64), at);
+        let found = plane.height(&Vector::from(x.map(|x| x as f32)));
+        assert_eq!(if found == 0.0 { 0 } else { found.signum() as i128 }, expected);
+        signs[(expected + 1) as usize] += 1;
+    }
+    assert!(signs[0] > 500 && signs[2] > 500, "{signs:?}");
+    for normal in [[0.0; 4], [f64::NAN, 0.0, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0, 0.0], [1e-300, 0.0, 0.0, 0.0]] {
+        assert_eq!(Hyperplane::<4>::new(normal.into(), 0.0), None);
+    }
+}
+
+#[test]
+fn wireframes_have_the_edges_of_polytopes() {
+    fn length<const D: usize>(mesh: &Mesh<D>, which: Edges) -> (usize, f64) {
+        let found = edges(mesh, which);
+        let long = |ends: [u32; 2]| {
+            let [a, b] = ends.map(|v| mesh.vertices[v as usize].cast::<f64>());
+            (a - b).norm()
+        };
+        (found.len(), found.iter().map(|edge| long(edge.ends)).sum())
+    }
+    for (cells, count) in [(5, 10), (8, 32), (16, 24), (24, 96), (120, 1200), (600, 720)] {
+        let mesh = mesh_of::<4>(json!({"polytope": {"cells": cells}}));
+        let (found, whole) = length(&mesh, Edges::Feature(10.0));
+        assert_eq!(found, count, "{cells}");
+        let one = whole / count as f64;
+        for edge in edges(&mesh, Edges::Feature(10.0)) {
+            let [a, b] = edge.ends.map(|v| mesh.vertices[v as usize]);
+            assert!((f64::from((a - b).norm()) - one).abs() < 1e-5, "{cells}");
+        }
+        if cells < 100 {
+            let finer = mesh_of::<4>(json!({"polytope": {"cells": cells, "subdivisions": 3}}));
+            let (pieces, long) = length(&finer, Edges::Feature(10.0));
+            assert_eq!(pieces, 3 * count);
+            near(long, whole, 1e-5);
+        }
+    }
+    for pieces in [1, 4] {
+        let cube = json!({"box": {"min": [0, 0, 0], "max": [1, 2, 3], "subdivisions": pieces}});
+        let (found, long) = length(&mesh_of::<3>(cube), Edges::Feature(10.0));
+        assert_eq!(found, 12 * pieces);
+        near(long, 4.0 * (1.0 + 2.0 + 3.0), 1e-6);
+        let tesseract = json!({"box": {"min": [0, 0, 0, 0], "max": [1, 2, 3, 4], "subdivisions": pieces}});
+        let (found, long) = length(&mesh_of::<4>(tesseract), Edges::Feature(10.0));
+        assert_eq!(found, 32 * pieces);
+        near(long, 8.0 * (1.0 + 2.0 + 3.0 + 4.0), 1e-6);
+    }
+    // The angle decides: neighbouring cells of the 600-cell meet at 15.5 degrees, faces of a sphere at less than 20.
+    let mesh = mesh_of::<4>(json!({"polytope": {"cells": 600}}));
+    assert_eq!([15.4, 15.6].map(|angle| length(&mesh, Edges::Feature(angle)).0), [720, 0]);
+    let sphere = mesh_of::<3>(json!({"sphere": {"radius": 1, "subdivisions": 12}}));
+    assert_eq!(length(&sphere, Edges::Feature(20.0)).0, 0);
+    // Euler: the sphere's edges are its triangles' sides, each shared by two.
+    assert_eq!(length(&sphere, Edges::All).0 * 2, sphere.simplices.len() * 3);
+    // An open body has its rim.
+    let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]];
+    let wall = json!({"simplices": {"vertices": corners, "cells": [[0, 1, 2], [0, 2, 3]]}});
+    assert_eq!(length(&mesh_of::<3>(wall), Edges::Feature(10.0)), (4, 4.0));
 }

@@ -29,6 +29,9 @@ stages:
   - write: {id: w2, input: parallel, vti: b.vti}
   - write: {id: w3, input: mended, vti: c.vti}
   - mesh: {id: m, input: s, occlusion: none, vtu: m.vtu}
+  - slice: {id: c, input: s, occlusion: none, normal: [0, 0, 0, 1], at: 0.1, vtp: c.vtp}
+  - slice: {id: cs, input: s, occlusion: none, range: [0, 1], count: 3, vtp: cs.vtp}
+  - wireframe: {id: wire, input: r, edges: feature, angle: 20, near: 0.1, vtp: wire.vtp}
   - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
 ";
 
@@ -86,6 +89,20 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("MeshSpec.input", Ok("m.input=other")),
     ("MeshSpec.occlusion", Ok("m.occlusion=o2")),
     ("MeshSpec.vtu", Err("a file doesn't depend on its name")),
+    ("SliceSpec.id", Err("a name for other stages")),
+    ("SliceSpec.input", Ok("c.input=other")),
+    ("SliceSpec.occlusion", Ok("c.occlusion=o2")),
+    ("SliceSpec.normal", Ok("c.normal=[0, 0, 1, 1]")),
+    ("SliceSpec.at", Ok("c.at=0.2")),
+    ("SliceSpec.range", Ok("cs.range=[0, 2]")),
+    ("SliceSpec.count", Err("changes which files there are; each file's key has its own place")),
+    ("SliceSpec.vtp", Err("a file doesn't depend on its name")),
+    ("WireframeSpec.id", Err("a name for other stages")),
+    ("WireframeSpec.input", Ok("wire.input=parallel")),
+    ("WireframeSpec.edges", Ok("wire.edges=all")),
+    ("WireframeSpec.angle", Ok("wire.angle=21")),
+    ("WireframeSpec.near", Ok("wire.near=0.2")),
+    ("WireframeSpec.vtp", Err("a file doesn't depend on its name")),
     ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.state", Err("a state is held against the file that is there, whole")),

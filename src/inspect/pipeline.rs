@@ -12,8 +12,8 @@ use crate::occlusion::Sidecar;
 /// What a file has to say where others would tell.
 const NOTHING: &str = "it was not made by `ao4d run`, or by a version that did not write it yet";
 
-/// The text of the pipeline that made a file, as YAML: from the field data of a `.vti` or `.vtu`, the text of a `.png`, or what
-/// stands beside a `.f32`.
+/// The text of the pipeline that made a file, as YAML: from the field data of a `.vti`, `.vtu` or `.vtp`, the text of a `.png`,
+/// or what stands beside a `.f32`.
 ///
 /// # Errors
 /// If the file can't be read, or tells of none.
@@ -22,7 +22,7 @@ pub fn pipeline(path: &Path) -> Result<String, Error> {
     let open = |path: &Path| crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause });
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let text = match ending.as_str() {
-        "vti" | "vtu" => {
+        "vti" | "vtu" | "vtp" => {
             let problem = |problem| vtk::Error::File { path: path.into(), problem };
             let fields = match vtk::parse_wanted(&open(path)?, Wanted::Named(&[PIPELINE])).map_err(problem)? {
                 DataSet::Image(image) => image.field_data,

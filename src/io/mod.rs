@@ -7,7 +7,7 @@
 //! | VTK's files read, as one model | `.vti`, `.vtu`, `.vtp`, each also in pieces, legacy `.vtk` | [`vtk`] |
 //! | lists of files over time read | `.pvd`, `.vti.series` | [`series`] |
 //! | images written | `.vti`, `.raw`, `.png` | [`vti`], [`raw`], [`png`] |
-//! | meshes and sequences written | `.vtu`, `.pvd` | [`vtu`], [`pvd`] |
+//! | meshes, slices and sequences written | `.vtu`, `.vtp`, `.pvd` | [`vtu`], [`vtp`], [`pvd`] |
 //! | figures for ParaView written | a script that finds its images beside itself | [`paraview`] |
 //!
 //! Every writer works over any `Write`, so it can be tested in memory; [`AtomicFile`] is the one place that opens
@@ -17,6 +17,7 @@
 mod atomic;
 mod error;
 pub mod image;
+mod inline;
 mod input;
 pub mod mesh;
 pub mod paraview;
@@ -26,6 +27,7 @@ pub mod raw;
 pub mod series;
 pub mod vti;
 pub mod vtk;
+pub mod vtp;
 pub mod vtu;
 mod xml;
 

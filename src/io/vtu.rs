@@ -4,19 +4,12 @@
 //! is in memory as a whole, its text is not. The points lie in ParaView's 3D, so what they were in 4D goes into a `position`
 //! array.
 
-use std::io::{self, BufRead, Write};
-
-use base64::engine::general_purpose::STANDARD;
-use base64::write::EncoderWriter;
+use std::io::{BufRead, Write};
 
 use super::Error;
+use super::inline::{File, check, check_indices};
 use super::vtk::cell::{TETRAHEDRON, TRIANGLE};
-use super::vtk::text::text_array;
-use super::xml::escape;
-use crate::volume::{Array, Kind, Values};
-
-/// Numbers turned into bytes at a time.
-const BATCH: usize = 1 << 14;
+use crate::volume::{Array, Kind};
 
 /// The cells of a mesh, as indices into its points.
 #[derive(Clone, Copy, Debug)]
@@ -59,10 +52,7 @@ pub fn write_told(
         Cells::Tetrahedra(c) => (c.as_flattened(), 4, TETRAHEDRON),
     };
     let count = flat.len() / size;
-    if let Some(p) = flat.iter().find(|&&p| p as usize >= points.len()) {
-        let (found, expected) = (format!("point {p}"), format!("one of {}", points.len()));
-        return Err(Error::Shape { array: "connectivity".into(), found, expected });
-    }
+    check_indices(flat, points.len())?;
     check(point_arrays, points.len())?;
     check(cell_arrays, count)?;
     let mut file = File { sink };
@@ -72,32 +62,15 @@ pub fn write_told(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\">\n<UnstructuredGrid>\n"
     )?;
-    if !texts.is_empty() {
-        file.text("<FieldData>\n")?;
-        for (name, text) in texts {
-            if name.is_empty() || name.contains(|c: char| c.is_control()) || text.contains('\0') {
-                return Err(Error::Name { what: "the field data name", name: (*name).to_owned() });
-            }
-            writeln!(file.sink, "{}", text_array(name, text))?;
-        }
-        file.text("</FieldData>\n")?;
-    }
+    file.texts(texts)?;
     write!(file.sink, "<Piece {piece}>\n<PointData>\n")?;
     point_arrays.iter().try_for_each(|array| file.array(array))?;
     file.text("</PointData>\n<CellData>\n")?;
     cell_arrays.iter().try_for_each(|array| file.array(array))?;
     file.text("</CellData>\n<Points>\n")?;
-    let coordinates = points.as_flattened();
-    file.data("Points", Kind::F32, 3, coordinates.len(), |range, bytes| {
-        coordinates[range].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
-    })?;
+    file.points(points)?;
     file.text("</Points>\n<Cells>\n")?;
-    file.data("connectivity", Kind::I64, 1, flat.len(), |range, bytes| {
-        flat[range].iter().for_each(|&p| bytes.extend(i64::from(p).to_le_bytes()));
-    })?;
-    file.data("offsets", Kind::I64, 1, count, |range, bytes| {
-        range.for_each(|i| bytes.extend((((i + 1) * size) as i64).to_le_bytes()));
-    })?;
+    file.cells(flat, size)?;
     file.data("types", Kind::U8, 1, count, |range, bytes| bytes.extend(range.map(|_| kind)))?;
     file.text("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n")?;
     Ok(file.sink.flush()?)
@@ -111,69 +84,10 @@ pub fn retell(mut source: impl BufRead, mut sink: impl Write, text: (&str, &str)
     super::vtk::text::retell(&mut source, &mut sink, text, |_, _| Ok(()))
 }
 
-/// A file in the making.
-struct File<W> {
-    sink: W,
-}
-
-impl<W: Write> File<W> {
-    fn text(&mut self, text: &str) -> io::Result<()> {
-        self.sink.write_all(text.as_bytes())
-    }
-
-    fn array(&mut self, array: &Array) -> io::Result<()> {
-        let values: &Values = &array.values;
-        self.data(&array.name, values.kind(), array.components, values.len(), |range, bytes| {
-            values.extend_le_bytes(range, bytes);
-        })
-    }
-
-    /// One `<DataArray>` of `count` numbers, whose bytes `fill` appends by ranges of numbers.
-    fn data(
-        &mut self,
-        name: &str,
-        kind: Kind,
-        components: usize,
-        count: usize,
-        fill: impl Fn(std::ops::Range<usize>, &mut Vec<u8>),
-    ) -> io::Result<()> {
-        let (name, number) = (escape(name), kind.vtk_name());
-        let attributes = format!("type=\"{number}\" Name=\"{name}\" NumberOfComponents=\"{components}\"");
-        writeln!(self.sink, "<DataArray {attributes} format=\"binary\">")?;
-        let mut encoder = EncoderWriter::new(&mut self.sink, &STANDARD);
-        encoder.write_all(&((count * kind.size()) as u64).to_le_bytes())?;
-        let mut bytes = Vec::with_capacity(BATCH * kind.size());
-        for start in (0..count).step_by(BATCH) {
-            bytes.clear();
-            fill(start..count.min(start + BATCH), &mut bytes);
-            encoder.write_all(&bytes)?;
-        }
-        encoder.finish()?;
-        drop(encoder);
-        self.text("\n</DataArray>\n")
-    }
-}
-
-/// Refuses arrays that don't have a tuple for each point or cell, or a name that can't stand in a file.
-fn check(arrays: &[Array], tuples: usize) -> Result<(), Error> {
-    for (i, array) in arrays.iter().enumerate() {
-        let shape = |found: String, expected: String| Error::Shape { array: array.name.clone(), found, expected };
-        if array.components.checked_mul(tuples) != Some(array.values.len()) || array.components == 0 {
-            let expected = format!("{tuples} tuples of {}", array.components);
-            return Err(shape(format!("{} numbers", array.values.len()), expected));
-        }
-        if arrays[..i].iter().any(|a| a.name == array.name) {
-            return Err(shape("the name a second time".into(), "another name".into()));
-        }
-        if array.name.is_empty() || array.name.contains(|c: char| c.is_control()) {
-            return Err(Error::Name { what: "the array name", name: array.name.clone() });
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
+    use std::io;
+
     use super::*;
     use crate::io::vtk;
 

@@ -13,11 +13,14 @@
 //! - [`rounding`]: which simplices turn over when rounded;
 //! - [`corners`]: where the surface creases, and vertices are split so that each side has a normal of its own;
 //! - simplices of measure zero, which no ray can hit.
+//!
+//! What is made of a mesh for the eye: cross-sections ([`section`]) and wireframes ([`edges`]).
 
 mod approach;
 mod build;
 pub mod copies;
 pub mod corners;
+pub mod edges;
 mod error;
 pub mod facets;
 pub mod identity;
@@ -26,6 +29,7 @@ mod nesting;
 pub mod normals;
 pub mod orientation;
 pub mod rounding;
+pub mod section;
 mod surface;
 pub mod topology;
 mod union_find;

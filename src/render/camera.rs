@@ -233,6 +233,11 @@ impl<const D: usize> Camera<D> {
         ([&self.right, &self.up, &self.over].map(|axis| axis.dot(&offset) * scale), distance)
     }
 
+    /// How rays spread.
+    pub fn projection(&self) -> Projection {
+        self.projection
+    }
+
     /// Whether rays are parallel.
     pub(super) fn is_parallel(&self) -> bool {
         matches!(self.projection, Projection::Parallel { .. })

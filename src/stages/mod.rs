@@ -1,4 +1,5 @@
-//! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`, `mesh`.
+//! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`, `mesh`, `slice`,
+//! `wireframe`.
 //!
 //! A stage's file holds all there is to know of it: what is written in YAML (its `Spec`), what is understood of that
 //! (its `Plan`: checked, resolved, every default filled in), its part of the key that tells whether a file is fresh, its
@@ -14,7 +15,8 @@
 //! - a `render` works on a scene, and is darkened by an occlusion of that scene. Named by `input` or `occlusion`, or
 //!   the nearest earlier of each. If these two don't belong together, the plan asks instead of guessing;
 //! - a `write` works on a render;
-//! - a `mesh` works on a scene, and has the values of an occlusion of that scene, found as a render finds them;
+//! - a `mesh` or a `slice` works on a scene, and has the values of an occlusion of that scene, found as a render finds them;
+//! - a `wireframe` works on the scene of a render, and looks through its camera;
 //! - a `paraview` figure works on writes, and finds them also by the name of their render.
 
 pub mod camera;
@@ -34,7 +36,9 @@ pub mod render;
 mod resolve;
 mod run;
 pub mod scene;
+pub mod slice;
 pub(crate) mod suggest;
+pub mod wireframe;
 pub mod write;
 
 use std::path::{Path, PathBuf};
@@ -328,4 +332,8 @@ stages! {
     Paraview: paraview::ParaviewSpec => paraview::FigurePlan;
     /// A scene's mesh as it is, without a camera.
     Mesh: mesh::MeshSpec => mesh::MeshPlan;
+    /// Cross-sections of a scene's bodies by hyperplanes.
+    Slice: slice::SliceSpec => slice::SlicePlan;
+    /// Edges of a scene's bodies as a render's camera sees them.
+    Wireframe: wireframe::WireframeSpec => wireframe::WireframePlan;
 }
