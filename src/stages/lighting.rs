@@ -9,7 +9,6 @@ use serde_json::{Map, Value};
 use super::Invalid;
 use super::camera::check_vector;
 use super::range::check_length;
-use super::render::RenderSpec;
 use crate::geometry::{Dimension, Vector64};
 use crate::render::tone::to_linear;
 use crate::render::{DepthCue, Light, Lighting, Source};
@@ -51,6 +50,16 @@ pub struct DepthCueSpec {
     pub far: f64,
     /// The colour (default 1, the white of the background).
     pub color: Option<Color>,
+}
+
+/// The keys of a render that say how it is lit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LightingKeys<'s> {
+    pub lights: Option<&'s [LightSpec]>,
+    pub ambient: Option<f64>,
+    pub specular: Option<f64>,
+    pub shininess: Option<f64>,
+    pub depth_cue: Option<&'s DepthCueSpec>,
 }
 
 /// How a render is lit.
@@ -104,12 +113,12 @@ pub struct DepthCuePlan {
 
 /// How the render at `path` is lit, if it is.
 pub(super) fn plan(
-    spec: &RenderSpec,
+    keys: LightingKeys,
     path: &str,
     dimension: Dimension,
     warnings: &mut Vec<Invalid>,
 ) -> Result<Option<LightingPlan>, Invalid> {
-    let given = spec.lights.as_deref().unwrap_or_default();
+    let given = keys.lights.unwrap_or_default();
     let mut lights = Vec::new();
     for (i, light) in given.iter().enumerate() {
         let place = format!("{path}.lights[{i}]");
@@ -121,21 +130,21 @@ pub(super) fn plan(
     }
     let [beside_lights, without] = AMBIENT;
     let ambient = if lights.is_empty() { without } else { beside_lights };
-    let ambient = within(&format!("{path}.ambient"), spec.ambient, ambient, 0.0, 1e6)?;
-    let specular = within(&format!("{path}.specular"), spec.specular, 0.0, 0.0, 1.0)?;
-    let shininess = within(&format!("{path}.shininess"), spec.shininess, SHININESS, 1.0, 1e6)?;
-    let depth_cue = spec.depth_cue.as_ref().map(|cue| depth_cue(cue, &format!("{path}.depth_cue"))).transpose()?;
+    let ambient = within(&format!("{path}.ambient"), keys.ambient, ambient, 0.0, 1e6)?;
+    let specular = within(&format!("{path}.specular"), keys.specular, 0.0, 0.0, 1.0)?;
+    let shininess = within(&format!("{path}.shininess"), keys.shininess, SHININESS, 1.0, 1e6)?;
+    let depth_cue = keys.depth_cue.map(|cue| depth_cue(cue, &format!("{path}.depth_cue"))).transpose()?;
     let mut unused = |key: &str, message: &str| warnings.push(Invalid::new(format!("{path}.{key}"), message));
-    if spec.lights.is_some() && lights.is_empty() {
+    if keys.lights.is_some() && lights.is_empty() {
         unused("lights", "has no light; without any, leave the key out");
     }
-    if spec.specular.is_some() && lights.is_empty() {
+    if keys.specular.is_some() && lights.is_empty() {
         unused("specular", "has no effect without `lights`: ambient light makes no highlights");
     }
-    if spec.shininess.is_some() && (lights.is_empty() || specular == 0.0) {
+    if keys.shininess.is_some() && (lights.is_empty() || specular == 0.0) {
         unused("shininess", "has no effect without `lights` and `specular`");
     }
-    let is_lit = !lights.is_empty() || spec.ambient.is_some() || depth_cue.is_some();
+    let is_lit = !lights.is_empty() || keys.ambient.is_some() || depth_cue.is_some();
     Ok(is_lit.then_some(LightingPlan { lights, ambient, specular, shininess, depth_cue }))
 }
 
@@ -254,13 +263,15 @@ pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>, id: &str) -> Vec<S
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stages::render::RenderSpec;
 
     fn lighting(keys: &str, dimension: u64) -> Result<(Option<LightingPlan>, Vec<String>), String> {
         let yaml = format!("dimensions: [1, 1]\n{keys}\n");
         let document = crate::pipeline::Document::parse("r.yaml", &yaml).unwrap();
         let spec: RenderSpec = document.decode().map_err(|e| e.to_string())?;
         let mut warnings = Vec::new();
-        let plan = plan(&spec, "render", Dimension::new(dimension).unwrap(), &mut warnings);
+        let keys = spec.lighting_keys();
+        let plan = plan(keys, "render", Dimension::new(dimension).unwrap(), &mut warnings);
         Ok((plan.map_err(|e| e.to_string())?, warnings.iter().map(ToString::to_string).collect()))
     }
 

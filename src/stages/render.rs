@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
-use super::lighting::{self, DepthCueSpec, LightSpec, LightingPlan};
+use super::lighting::{self, DepthCueSpec, LightSpec, LightingKeys, LightingPlan};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::scene::{MISSING, ScenePlan};
 use super::write::{Content, PictureFiles, WritePlan};
@@ -133,6 +133,19 @@ pub struct RenderPlan {
     pub arrays: Vec<Aov>,
 }
 
+impl RenderSpec {
+    /// What it says of lights.
+    pub(super) fn lighting_keys(&self) -> LightingKeys<'_> {
+        LightingKeys {
+            lights: self.lights.as_deref(),
+            ambient: self.ambient,
+            specular: self.specular,
+            shininess: self.shininess,
+            depth_cue: self.depth_cue.as_ref(),
+        }
+    }
+}
+
 impl RenderPlan {
     /// The number of voxels.
     pub fn voxels(&self) -> u64 {
@@ -212,7 +225,7 @@ impl Stage for RenderPlan {
         }
         let layers = if dimension == Dimension::Four { 3 } else { 0 };
         let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
-        let lighting = lighting::plan(spec, path, dimension, &mut resolver.plan.warnings)?;
+        let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
         let arrays = Vec::new();
         let tolerance = (shading == Shading::Auto && denoise).then_some(tolerance);
         Ok(Self {
