@@ -405,7 +405,7 @@ fn wrong_images_are_told() {
             ["plain.tif", "has 110 pages, which are not 1 channels of 5 slices at 5 times"],
         ),
         (json!({"file": "plain.tif", "dimensions": POINTS, "channel": 1}), 1.0, ["plain.tif", "there is no channel 1"]),
-        (json!({"file": "hdf.nc"}), 1.0, ["hdf.nc", "nccopy"]),
+        (json!({"file": "hdf.nc"}), 1.0, ["hdf.nc", "its HDF5 can't be read"]),
         (json!({"file": "text.nrrd"}), 1.0, ["text.nrrd", "is no NRRD file"]),
         (json!({"file": "ball.png"}), 1.0, ["ball.png", "must end in one of .vti"]),
         (json!({"files": ["a.vti", "b.vti"]}), 1.0, ["b.vti: has [12, 13, 11, 1] points", "unlike the first file"]),

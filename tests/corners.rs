@@ -1,13 +1,17 @@
-//! Vertices split at creases, and the values there: limits along each face, known in closed form, in 3D and 4D.
+//! Vertices split at creases, and the values there: limits along each face, known in closed form, in 3D and 4D. Then sheets
+//! with two sides, and closed surfaces seen from inside.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use ao4d::accel::Tracer;
-use ao4d::geometry::Vector64;
-use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::geometry::{Vector, Vector64, normal_of};
+use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface, Viewpoint};
 use ao4d::occlusion::{Estimator, exact};
 use ao4d::progress::Silent;
+use ao4d::render::{Aov, Camera, Shading, View};
 use ao4d::scene::{CreaseAngle, ObjectSpec, build_object};
+use ao4d::session::Session;
 use ao4d::trace::cpu::{CpuBackend, estimate_at};
 use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 
@@ -188,4 +192,221 @@ fn the_angle_is_said_in_degrees_or_off() {
     }
     let spec = ObjectSpec { crease_angle: Some(CreaseAngle::Degrees(f64::NAN)), ..with(1.into()).unwrap() };
     assert!(spec.crease().is_err());
+}
+
+/// The hyperplane w = 0 (in 3D z = 0) from -1 to 1, in D - 1 dimensions cut into simplices around one diagonal or, mirrored,
+/// another; facing up or down. Each copy has vertices of its own.
+fn sheet<const D: usize>(mirrored: bool, up: bool) -> Surface<D> {
+    let mut orders = vec![vec![]];
+    for axis in 0..D - 1 {
+        let longer =
+            |order: Vec<usize>| (0..=order.len()).map(move |at| [&order[..at], &[axis], &order[at..]].concat());
+        orders = orders.into_iter().flat_map(longer).collect();
+    }
+    let (mut vertices, mut simplices) = (Vec::new(), Vec::new());
+    for order in orders {
+        let mut corner = Vector64::<D>::from_fn(|r, _| if r < D - 1 { -1.0 } else { 0.0 });
+        let mut corners = vec![corner];
+        for axis in order {
+            corner[axis] = 1.0;
+            corners.push(corner);
+        }
+        if mirrored {
+            corners.iter_mut().for_each(|corner| corner[0] = -corner[0]);
+        }
+        let normal = normal_of(&std::array::from_fn::<_, D, _>(|i| corners[i]));
+        if (normal[D - 1] > 0.0) != up {
+            corners.swap(0, 1);
+        }
+        simplices.push(std::array::from_fn(|i| (vertices.len() + i) as u32));
+        vertices.extend(corners);
+    }
+    Surface { vertices, simplices, normals: None }
+}
+
+fn joined<const D: usize>(sheets: &[Surface<D>]) -> Surface<D> {
+    let mut all = Surface { vertices: Vec::new(), simplices: Vec::new(), normals: None };
+    for sheet in sheets {
+        let before = all.vertices.len() as u32;
+        all.simplices.extend(sheet.simplices.iter().map(|s| s.map(|v| v + before)));
+        all.vertices.extend(&sheet.vertices);
+    }
+    all
+}
+
+/// What a camera above the sheet sees of ambient occlusion, by values at vertices, by values at voxels, by few rays at either.
+fn seen<const D: usize>(session: &Session<D>, eye: f64) -> Vec<Vec<f32>> {
+    let over_all = Vector64::<D>::from_fn(|r, _| if r == D - 1 { eye } else { 0.1 * r as f64 });
+    let camera = Camera::new(&View { eye: over_all, ..View::default() }).unwrap();
+    let exact = Estimator::Exact(exact::Budget::default());
+    let values = |estimator| Arc::new(session.occlusion(estimator, None, &Silent).unwrap());
+    let few = Sampling::new(64, 1);
+    let shadings = [
+        Shading::Smooth(values(exact)),
+        Shading::Voxel(exact),
+        Shading::Smooth(values(Estimator::Adaptive(few))),
+        Shading::Voxel(Estimator::Sampled(few)),
+    ];
+    let dimensions = if D == 4 { [6, 5, 3] } else { [13, 11, 1] };
+    (shadings.into_iter())
+        .map(|shading| {
+            let found = session.render(camera.clone(), dimensions, shading, &[Aov::AmbientOcclusion], &Silent).unwrap();
+            let values = &found.array("ambient_occlusion").unwrap().values;
+            (0..values.len()).map(|i| values.get(i) as f32).collect()
+        })
+        .collect()
+}
+
+fn two_sided_sheets<const D: usize>() {
+    let box_above = || cuboid::<D>(0.25, 0.75, 1).0;
+    let scene = |sheets: &[Surface<D>], crease: Crease| {
+        let mut builder = MeshBuilder::new();
+        builder.add_creased("sheet", [0.8; 3], &joined(sheets), Orientation::Input, crease).unwrap();
+        builder.add_creased("box", [0.8; 3], &box_above(), Orientation::Input, Crease::Above(30.0)).unwrap();
+        Session::new(builder.finish())
+    };
+    for crease in [Crease::Never, Crease::Above(30.0), Crease::Above(180.0)].into_iter().take(6 - D) {
+        let [up, down] = [true, false].map(|up| sheet::<D>(false, up));
+        // From either side the scene looks as with that side alone.
+        for (eye, alone) in [(2.5, &up), (-2.5, &down)] {
+            let expected = seen(&scene(std::slice::from_ref(alone), crease), eye);
+            assert!(expected[1].iter().any(|&a| a < 0.95) == (eye > 0.0), "the box is above");
+            let half = Surface { simplices: down.simplices[1..].to_vec(), ..down.clone() };
+            let cut_otherwise = sheet::<D>(true, eye < 0.0);
+            let (whole, partial) =
+                ([up.clone(), down.clone()], if eye > 0.0 { vec![half, up.clone()] } else { vec![] });
+            let other = if eye > 0.0 { [cut_otherwise, up.clone()] } else { [cut_otherwise, down.clone()] };
+            for (what, sheets) in [
+                ("two", whole.to_vec()),
+                ("two, the other first", whole.iter().rev().cloned().collect()),
+                ("three", vec![down.clone(), up.clone(), down.clone()]),
+                ("four", vec![up.clone(), up.clone(), down.clone(), up.clone()]),
+                ("the other side in part", partial),
+                ("the other side cut otherwise", other.to_vec()),
+                ("the same first", other.iter().rev().cloned().collect()),
+            ] {
+                if sheets.is_empty() {
+                    continue;
+                }
+                let found = seen(&scene(&sheets, crease), eye);
+                for (way, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                    // The exact ones are the same; rays of vertices with other numbers are others.
+                    let room = if way < 2 { 1e-6 } else { 0.06 };
+                    for (i, (a, b)) in found.iter().zip(expected).enumerate() {
+                        assert!(
+                            (a - b).abs() < room,
+                            "{D}D, {crease:?}, {what}, {eye}, way {way}, voxel {i}: {a}, {b}"
+                        );
+                    }
+                }
+            }
+        }
+        // Which side comes first changes no bit.
+        let [one, other] = [[&up, &down], [&down, &up]].map(|s| scene(&s.map(Surface::clone), crease));
+        assert_eq!(seen(&one, 2.5), seen(&other, 2.5), "{D}D, {crease:?}");
+    }
+}
+
+#[test]
+fn sheets_may_have_two_sides() {
+    two_sided_sheets::<3>();
+    two_sided_sheets::<4>();
+}
+
+/// Whether a vertex's normal points away from the origin.
+fn outwards<const D: usize>(mesh: &Mesh<D>, vertices: std::ops::Range<usize>) -> Option<bool> {
+    let out: Vec<bool> = vertices.map(|v| mesh.normals[v].dot(&mesh.vertices[v]) > 0.0).collect();
+    out.iter().all(|o| *o == out[0]).then(|| out[0])
+}
+
+fn rooms<const D: usize>() {
+    // Three boxes within each other, as one object: seen from the space between two of them, all face that.
+    let shells: Vec<Surface<D>> = [4.0, 2.0, 1.0].map(|half| cuboid::<D>(-half, half, 2).0).to_vec();
+    let count = shells[0].vertices.len();
+    let all = joined(&shells);
+    for (place, expected) in [
+        (0.3, [false, false, false]),
+        (1.5, [false, false, true]),
+        (3.1, [false, true, true]),
+        (9.0, [true, true, true]),
+    ] {
+        let eye = Vector::<D>::from_fn(|r, _| if r == D - 1 { place } else { 0.0 });
+        let direction = Vector::<D>::from_fn(|r, _| if r == D - 1 { 1.0 } else { 0.0 });
+        for viewpoint in [Viewpoint::Eye(eye), Viewpoint::Parallel { direction, middle: eye }] {
+            let mut builder = MeshBuilder::new();
+            builder.add("shells", [0.8; 3], &all, Orientation::Facing(viewpoint)).unwrap();
+            let mesh = builder.finish();
+            assert_eq!((mesh.objects[0].components, mesh.objects[0].closed_components), (3, 3));
+            let found = [0, 1, 2].map(|shell| outwards(&mesh, shell * count..(shell + 1) * count));
+            assert_eq!(found, expected.map(Some), "{D}D, {viewpoint:?}");
+        }
+    }
+    // A room with a box in it, by rays of some length: values at vertices are those of the inside.
+    let view = View { eye: Vector64::from_fn(|r, _| 0.2 * (r + 1) as f64), ..View::default() };
+    let camera = Camera::<D>::new(&view).unwrap();
+    let picture = |facing: Orientation<D>| {
+        let mut builder = MeshBuilder::new();
+        let (room, crease) = cuboid::<D>(-1.0, 1.0, 4);
+        builder.add_creased("room", [0.8; 3], &room, facing, crease).unwrap();
+        builder.add_creased("box", [0.8; 3], &cuboid::<D>(-0.75, -0.25, 1).0, Orientation::Input, crease).unwrap();
+        let session = Session::new(builder.finish());
+        let estimator = Estimator::Sampled(Sampling { max_distance: 0.8, ..Sampling::new(64, 1) });
+        let values = Arc::new(session.occlusion(estimator, None, &Silent).unwrap());
+        let dimensions = [12, 12, if D == 4 { 6 } else { 1 }];
+        [Shading::Smooth(values), Shading::Voxel(estimator)].map(|shading| {
+            let found = session.render(camera.clone(), dimensions, shading, &[Aov::AmbientOcclusion], &Silent).unwrap();
+            let values = &found.array("ambient_occlusion").unwrap().values;
+            (0..values.len()).map(|i| values.get(i)).sum::<f64>() / values.len() as f64
+        })
+    };
+    let [smooth, voxel] = picture(Orientation::Facing(camera.viewpoint()));
+    assert!((smooth - voxel).abs() < 0.06 && voxel < 0.9, "{D}D: {smooth} {voxel}");
+    let [outside, inside] = picture(Orientation::Input);
+    assert!(outside > voxel + 0.05 && (inside - voxel).abs() < 1e-9, "{D}D: {outside} {inside} {voxel}");
+}
+
+#[test]
+fn rooms_are_seen_from_inside() {
+    rooms::<3>();
+    rooms::<4>();
+}
+
+#[test]
+fn a_body_listed_twice_is_that_body() {
+    fn check<const D: usize>() {
+        let (once, crease) = cuboid::<D>(-1.0, 1.0, 2);
+        let mut inwards = once.clone();
+        inwards.simplices.iter_mut().for_each(|s| s.swap(0, 1));
+        for twice in [[&once, &once], [&inwards, &inwards]].map(|s| joined(&s.map(Surface::clone))) {
+            let mesh = mesh(vec![(twice, crease)]);
+            assert_eq!((mesh.objects[0].components, mesh.objects[0].closed_components), (1, 1));
+            assert_eq!(
+                (mesh.copies.len(), outwards(&mesh, 0..mesh.vertices.len())),
+                (once.simplices.len(), Some(true))
+            );
+            assert!(values(&mesh).iter().all(|&a| a == 1.0));
+        }
+    }
+    check::<3>();
+    check::<4>();
+}
+
+/// Many simplices in one place cost as many simplices, not their square.
+#[test]
+fn coincident_simplices_cost_what_others_cost() {
+    let corners = [[0.0; 4], [1.0, 0.0, 0.0, 0.1], [0.0, 1.0, 0.0, 0.2], [0.0, 0.0, 1.0, 0.3]].map(Vector64::from);
+    let count = 3_000;
+    for crease in [Crease::Never, Crease::Above(30.0)] {
+        let vertices = std::iter::repeat_n(corners, count).flatten().collect();
+        let simplices = (0..count as u32).map(|s| [0, 1, 2, 3].map(|i| 4 * s + i)).collect();
+        let mesh = mesh(vec![(Surface { vertices, simplices, normals: None }, crease)]);
+        assert_eq!((mesh.vertices.len(), mesh.copies.len()), (4 * count, count - 1));
+        let backend = CpuBackend::new(Tracer::new(mesh.clone()));
+        let estimator = Estimator::Sampled(Sampling::new(4, 1));
+        let found = estimator.estimate(&backend, &ShadingPoint::vertices(&mesh), None, &Silent).unwrap();
+        assert!(found.values.iter().all(|&a| a == 1.0));
+        // Neither rays nor the cones around a vertex meet more than one of them.
+        assert_eq!(backend.tracer().bvh().order, [0]);
+        assert!((0..4).all(|v| backend.tracer().incidence().around(v) == [0]));
+    }
 }

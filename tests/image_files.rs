@@ -463,7 +463,9 @@ fn netcdf_axes_by_name_and_attribute() {
     write(&netcdf(1, &odd, &[field(&[0, 1, 2, 3], [0, 1, 3, 2])]));
     is_refused(at, json!({"file": "a.nc"}), &["\"plume\" of 5 points", "axes"]);
     std::fs::write(at.join("a.nc"), b"\x89HDF\r\n\x1a\n").unwrap();
-    is_refused(at, json!({"file": "a.nc"}), &["unsupported: a NetCDF-4 file", "nccopy -k"]);
+    is_refused(at, json!({"file": "a.nc"}), &["its HDF5 can't be read"]);
+    std::fs::write(at.join("a.nc"), b"\x0e\x03\x13\x01").unwrap();
+    is_refused(at, json!({"file": "a.nc"}), &["unsupported: an HDF4 file", "h4tonccf"]);
 }
 
 #[test]

@@ -89,14 +89,15 @@ fn images() {
         text,
         format!(
             "a.vti, {bytes} bytes: an image of 2 x 3 x 2 points\norigin (-1, 0, 1), spacing (0.5, 0.25, 0.333333)\n\
-             on points:\n  depth, 1 x Float32: 2.5 to 2.5, mean 2.5, 11 infinite\n  \
-             rgba, 4 x UInt8: {component}; {component}; {component}; {component}\nfield data:\n  program: a test\n"
+             on points:\n  depth, 1 x Float32: 2.5 to 2.5, mean 2.5, 11 infinite\n    \
+             in 16 equal parts of this range: 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0\n  rgba, 4 x UInt8: {component}; {component}; {component}; {component}\nfield data:\n  program: a test\n"
         )
     );
     let (_, text) = folder.says(&["info", "a.vti", "--json"]);
     let json: Value = serde_json::from_str(&text).unwrap();
     assert_eq!((&json["kind"], &json["dimensions"]), (&json!("image"), &json!([2, 3, 2])));
     assert_eq!(json["spacing"][2], json!(1.0 / 3.0));
+    assert_eq!((&json["axes"][1]["points"], &json["axes"][1]["last"]), (&json!(3), &json!(0.5)));
     assert_eq!(json["point_arrays"][0]["ranges"][0]["infinite"], json!(11));
     assert_eq!((&json["point_arrays"][1]["type"], &json["field_data"]["program"]), (&json!("u8"), &json!("a test")));
 }

@@ -720,8 +720,12 @@ fn damaged_files_are_refused_by_name() {
         assert!(folder.read::<3>(&format!("folder.{ending}")).unwrap_err().contains("can't read"));
     }
     refused("mesh.obj", b"v 0 0 0", "holds no triangle");
-    refused("mesh.off", b"OFF", "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp or .vtu");
-    refused("no-name", b"v 0 0 0", "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp or .vtu");
+    refused("mesh.off", b"OFF", "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or");
+    refused(
+        "no-name",
+        b"v 0 0 0",
+        "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or",
+    );
     refused("cut.stl", &binary_stl("x")[..100], "it declares 4 triangles, which take 284 bytes, and has 100");
     refused("none.stl", ascii_stl("", &[]).as_bytes(), "holds no triangle");
     refused("word.stl", ascii_stl("", &CORNER).replace("vertex 1", "vertex one").as_bytes(), "triangle 0");

@@ -59,6 +59,27 @@ impl<const D: usize> Bvh<D> {
         false
     }
 
+    /// Calls `visit` for items in leaves whose boxes, and all boxes above them, `accepts` holds for.
+    pub fn within(&self, accepts: impl Fn(&Aabb<D>) -> bool, mut visit: impl FnMut(u32)) {
+        let mut stack = [0u32; STACK];
+        let mut depth = usize::from(!self.nodes.is_empty());
+        while depth > 0 {
+            depth -= 1;
+            let node = &self.nodes[stack[depth] as usize];
+            if !accepts(&node.bounds) {
+                continue;
+            }
+            if node.count > 0 {
+                let first = node.first as usize;
+                self.order[first..first + node.count as usize].iter().for_each(|&i| visit(i));
+            } else {
+                stack[depth] = node.first + 1;
+                stack[depth + 1] = node.first;
+                depth += 2;
+            }
+        }
+    }
+
     /// Calls `visit` for items whose boxes the ray may meet, roughly near to far; it returns the distance beyond which
     /// nothing is wanted any more.
     #[inline]

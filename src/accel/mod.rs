@@ -4,6 +4,7 @@
 mod build;
 mod bvh;
 mod node;
+mod overlap;
 mod tracer;
 mod wide;
 

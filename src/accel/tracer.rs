@@ -10,7 +10,7 @@ use super::{Bvh, WideBvh};
 use crate::geometry::{Aabb, Cone, Crossing, Ray};
 use crate::mesh::{Incidence, Mesh};
 
-/// A mesh with the hierarchy over its simplices of positive measure, which is made when it is first asked for. It owns
+/// A mesh with the hierarchy over its simplices of positive measure, the first of each place, which is made when it is first asked for. It owns
 /// the mesh together with whoever else holds it, so it can be kept in anything.
 #[derive(Clone, Debug)]
 pub struct Tracer<const D: usize> {
@@ -81,6 +81,10 @@ impl<const D: usize> Tracer<D> {
         if !self.mesh.degenerate.is_empty() {
             solid.retain(|s| self.mesh.degenerate.binary_search(s).is_err());
         }
+        // A ray that hits several in one place hits the first.
+        if !self.mesh.copies.is_empty() {
+            solid.retain(|&s| self.mesh.copies.first(s) == s);
+        }
         Bvh::build(&solid, |s| Aabb::of(&self.mesh.corners(s)), parallel)
     }
 
@@ -99,7 +103,13 @@ impl<const D: usize> Tracer<D> {
     /// Whether the ray hits any simplex but `ignored` at a distance in `(0, limit]`.
     #[inline]
     pub fn occluded(&self, ray: &Ray<D>, limit: f32, ignored: Option<u32>) -> bool {
-        self.bvh().any(ray, limit, |simplex| ignored != Some(simplex) && self.hits(simplex, ray, limit))
+        self.occluded_by_others(ray, limit, ignored.as_slice())
+    }
+
+    /// Whether the ray hits any simplex but the `ignored` ones at a distance in `(0, limit]`.
+    #[inline]
+    pub fn occluded_by_others(&self, ray: &Ray<D>, limit: f32, ignored: &[u32]) -> bool {
+        self.bvh().any(ray, limit, |simplex| !ignored.contains(&simplex) && self.hits(simplex, ray, limit))
     }
 
     /// The simplex that the ray hits first, if any.
@@ -174,7 +184,7 @@ impl<const D: usize> Tracer<D> {
 
     /// Compares the distances of two hits exactly, as fractions.
     #[cold]
-    fn exact_order(&self, ray: &Ray<D>, simplex: u32, cone: &Cone<D>, other: u32) -> Ordering {
+    pub(super) fn exact_order(&self, ray: &Ray<D>, simplex: u32, cone: &Cone<D>, other: u32) -> Ordering {
         let corners = self.mesh.corners(other);
         if self.mesh.corners(simplex).iter().all(|corner| corners.contains(corner)) {
             return Ordering::Equal; // one on the other, as where two boxes touch

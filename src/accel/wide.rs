@@ -21,6 +21,8 @@ pub const WIDTH: usize = 8;
 /// What boxes grow by on each side, in widths of the scene. All rounding of a box, of its place, of the origin and in the box
 /// test is less: ten times numbers below 3/2 relative to 2^-24.
 const GROWTH: f64 = 1.0 / (1 << 20) as f64;
+/// Boxes of fewer growths than this hold mostly what is beside them.
+const COARSE: f64 = 4.0;
 /// Cost of testing the boxes of one binary node, in simplex blocks.
 const BOX_COST: f32 = 0.4;
 /// Bits of a child reference that are left to its user.
@@ -106,6 +108,8 @@ pub struct WideBvh<const D: usize> {
     pub depth: usize,
     /// The number of simplices of the mesh.
     total: usize,
+    /// Whether most boxes are larger than what they grow by. They aren't where something lies a million sizes away.
+    fine: bool,
 }
 
 /// What becomes of the nodes of the binary tree.
@@ -149,6 +153,7 @@ impl<const D: usize> WideBvh<D> {
             scale: Scale::of(&mesh.vertices),
             depth: 0,
             total: mesh.simplices.len(),
+            fine: true,
         };
         if bvh.nodes.is_empty() {
             return wide;
@@ -156,13 +161,15 @@ impl<const D: usize> WideBvh<D> {
         let plan = Plan::new(bvh);
         wide.nodes.push(WideNode::empty());
         let mut open = vec![(0usize, 0usize, 1usize)];
-        let mut leaves = Vec::new();
+        let (mut leaves, mut sides) = (Vec::new(), Vec::new());
         while let Some((source, target, depth)) = open.pop() {
             wide.depth = wide.depth.max(depth);
             let children = Self::children(bvh, &plan, source);
             for (lane, &child) in children.iter().enumerate() {
                 let index = if plan.is_leaf[child] {
                     leaves.push(plan.ranges[child]);
+                    let bounds = &bvh.nodes[child].bounds;
+                    sides.push((widen(&bounds.max) - widen(&bounds.min)).max() * wide.scale.factor);
                     wide.nodes[target].leaves |= 1 << lane;
                     (leaves.len() - 1) as u32
                 } else {
@@ -174,6 +181,8 @@ impl<const D: usize> WideBvh<D> {
             }
         }
         wide.nodes.shrink_to_fit();
+        let middle = sides.len() / 2;
+        wide.fine = *sides.select_nth_unstable_by(middle, f64::total_cmp).1 > COARSE * GROWTH;
         let leaf = |(first, end): (u32, u32)| Leaf::new(&bvh.order[first as usize..end as usize], mesh, &wide.scale);
         wide.leaves = if parallel {
             leaves.into_par_iter().with_min_len(256).map(leaf).collect()
@@ -183,10 +192,11 @@ impl<const D: usize> WideBvh<D> {
         wide
     }
 
-    /// Whether there are few enough nodes and leaves for references to them, and the point is near enough to the scene for its
-    /// box tests. If not, ask the binary tree.
+    /// Whether there are few enough nodes and leaves for references to them, boxes that hold little but what is in them, and
+    /// the point is near enough to the scene for its box tests. If not, ask the binary tree, whose boxes don't grow.
     pub fn serves(&self, point: &Vector<D>) -> bool {
-        self.nodes.len().max(self.leaves.len()) < 1 << (32 - TAG_BITS)
+        self.fine
+            && self.nodes.len().max(self.leaves.len()) < 1 << (32 - TAG_BITS)
             && self.total < 1 << 31
             && self.scale.centred(point).amax() <= 1.0
     }

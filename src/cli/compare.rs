@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use ao4d::inspect;
 use ao4d::inspect::compare::Tolerance;
+use ao4d::progress::Progress;
 use clap::Args;
 
 use super::console::Console;
+use super::watch::Watch;
 use super::{Failure, Outcome};
 
 /// What `compare` takes. A value differs where |a - b| > ATOL + RTOL |b|.
@@ -37,9 +39,12 @@ impl Compare {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         super::existing(&self.a)?;
         super::existing(&self.b)?;
+        let watch = Watch::new(console)?;
+        let running = (&watch as &dyn Progress).stage("comparing", 0);
         let Self { a, b, atol, rtol, max_different, array, json } = self;
         let tolerance = Tolerance { atol, rtol, max_different, arrays: array };
         let comparison = inspect::compare(&a, &b, &tolerance)?;
+        running.end();
         if json { console.json(&comparison) } else { console.result(&comparison.to_string()) }?;
         Ok(if comparison.same { Outcome::Done } else { Outcome::Different })
     }

@@ -69,9 +69,14 @@ impl Console {
         self.note(&format!("warning: {warning}"));
     }
 
+    /// Whether notes are unwanted.
+    pub fn quiet(&self) -> bool {
+        self.messages.quiet
+    }
+
     /// Prints a message, unless quiet is wanted.
     pub fn note(&self, text: &str) {
-        if !self.messages.quiet {
+        if !self.quiet() {
             to_stderr(text);
         }
     }

@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use ao4d::inspect;
 use ao4d::pipeline::Told;
+use ao4d::progress::Progress;
 use clap::Args;
 
 use super::console::Console;
+use super::watch::Watch;
 use super::{Failure, Outcome};
 
 /// What `info` takes.
@@ -37,11 +39,14 @@ impl Info {
             console.result(&told.text)?;
             return Ok(Outcome::Done);
         }
+        let watch = Watch::new(console)?;
+        let running = (&watch as &dyn Progress).stage(&format!("reading {}", self.file.display()), 0);
         let array = self.array.as_deref();
         let info = inspect::Info::read_array(&self.file, array)?;
         if let Some(values) = &self.values {
             inspect::image::write_values(&self.file, array, values)?;
         }
+        running.end();
         if self.json { console.json(&info) } else { console.result(&info.to_string()) }?;
         Ok(Outcome::Done)
     }

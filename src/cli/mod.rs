@@ -148,7 +148,7 @@ pub fn main() -> ExitCode {
             3
         }
         Err(Failure::Cancelled) => {
-            console.note("interrupted");
+            watch::tell_interrupted(console.quiet());
             130
         }
     })

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use ao4d::pipeline::{Pipeline, RunError, run};
+use ao4d::progress::Progress;
 use clap::Args;
 
 use super::console::Console;
@@ -26,7 +27,11 @@ impl Run {
         let (pipelines, settings) = self.options.load_all(console)?;
         let watch = Watch::new(console)?;
         if pipelines.len() > 1 {
-            settings.pool().map_err(RunError::Threads)?.install(|| check_together(&pipelines))?;
+            let checked = settings.pool().map_err(RunError::Threads)?.install(|| check_together(&pipelines, &watch));
+            if watch.cancelled() {
+                return Err(Failure::Cancelled);
+            }
+            checked?;
         }
         let mut reports = Vec::with_capacity(pipelines.len());
         for pipeline in &pipelines {
@@ -54,7 +59,8 @@ impl Run {
 
 /// Finds what is wrong with the last pipeline before the first is run. What reads a file that an earlier one writes can be
 /// tried only once that is there.
-fn check_together(pipelines: &[Pipeline]) -> Result<(), ao4d::pipeline::Error> {
+fn check_together(pipelines: &[Pipeline], progress: &dyn Progress) -> Result<(), ao4d::pipeline::Error> {
+    let _running = progress.stage("reading inputs", 0);
     let mut written = BTreeSet::new();
     for pipeline in pipelines {
         let plan = &pipeline.plan;
@@ -62,7 +68,7 @@ fn check_together(pipelines: &[Pipeline]) -> Result<(), ao4d::pipeline::Error> {
         let later: Vec<bool> = (0..plan.stages.len())
             .map(|stage| reads_those(stage) || plan.scene_of(stage).is_some_and(|scene| reads_those(scene.index())))
             .collect();
-        pipeline.prepare(|stage| !later[stage])?;
+        pipeline.prepare_watched(|stage| !later[stage], progress)?;
         let files = (0..plan.stages.len()).flat_map(|stage| plan.all_files_of(stage));
         written.extend(files.map(|file| place(&plan.out.join(file))));
     }

@@ -1,7 +1,7 @@
 //! Who watches a run: a bar on a terminal, lines with `-v`, and Ctrl-C.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 use std::time::{Duration, Instant};
 
 use ao4d::progress::Progress;
@@ -9,14 +9,17 @@ use ao4d::text::for_terminal;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Failure;
-use super::console::Console;
+use super::console::{self, Console};
 
 /// Reports to the console, and knows whether Ctrl-C was pressed.
 pub struct Watch<'a> {
     console: &'a Console,
     cancelled: Arc<AtomicBool>,
-    current: Mutex<Option<Current>>,
+    current: Arc<Mutex<Option<Current>>>,
 }
+
+/// How long work has to hear Ctrl-C by itself, as nearly all does.
+const PATIENCE: Duration = Duration::from_millis(600);
 
 struct Current {
     stage: String,
@@ -25,22 +28,53 @@ struct Current {
 }
 
 impl<'a> Watch<'a> {
-    /// Begins to listen for Ctrl-C. The first asks the run to stop and clean up, the second doesn't ask.
+    /// Begins to listen for Ctrl-C. The first asks the work to stop and clean up, and ends it if it doesn't in time; the
+    /// second ends it at once.
     pub fn new(console: &'a Console) -> Result<Self, Failure> {
         let cancelled = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&cancelled);
+        let current = Arc::new(Mutex::new(None));
+        let (flag, bar, quiet) = (Arc::clone(&cancelled), Arc::clone(&current), console.quiet());
         let handler = move || {
             if flag.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
+                end(&bar, quiet);
             }
+            let bar = Arc::clone(&bar);
+            std::thread::spawn(move || {
+                std::thread::sleep(PATIENCE);
+                end(&bar, quiet);
+            });
         };
         ctrlc::set_handler(handler).map_err(|e| Failure::Failed(Box::new(e)))?;
-        Ok(Watch { console, cancelled, current: Mutex::new(None) })
+        Ok(Watch { console, cancelled, current })
     }
 
     fn current(&self) -> MutexGuard<'_, Option<Current>> {
-        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.current)
     }
+}
+
+fn locked(current: &Mutex<Option<Current>>) -> MutexGuard<'_, Option<Current>> {
+    current.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends the process where the work doesn't by itself; nothing that isn't whole is left of it.
+fn end(current: &Mutex<Option<Current>>, quiet: bool) -> ! {
+    ao4d::io::abandon();
+    if let Some(current) = locked(current).take() {
+        current.bar.finish_and_clear();
+    }
+    tell_interrupted(quiet);
+    std::process::exit(130);
+}
+
+/// Says once that Ctrl-C was pressed, whoever comes first: the work that heard it, or who ends it.
+pub fn tell_interrupted(quiet: bool) {
+    static TOLD: Once = Once::new();
+    TOLD.call_once(|| {
+        if !quiet {
+            console::to_stderr("interrupted");
+        }
+    });
 }
 
 impl Progress for Watch<'_> {

@@ -141,6 +141,11 @@ pub(super) fn text_of(fields: &[Field], name: &str) -> Option<String> {
 }
 
 impl Tolerance {
+    /// Whether it is about this array and no other.
+    pub(super) fn takes_all_of(&self, array: &str) -> bool {
+        self.arrays.iter().all(|name| name == array)
+    }
+
     fn takes(&self, array: &str) -> bool {
         self.arrays.is_empty() || self.arrays.iter().any(|name| name == array)
     }
@@ -186,6 +191,11 @@ impl Comparison {
         }
     }
 
+    /// Of one array.
+    pub(super) fn of(array: ArrayComparison) -> Self {
+        Self { same: array.same, differences: Vec::new(), arrays: vec![array] }
+    }
+
     /// Texts of the field data that are asked for by name.
     fn texts(&mut self, a: &[Field], b: &[Field], tolerance: &Tolerance) {
         for name in &tolerance.arrays {
@@ -227,45 +237,73 @@ impl Comparison {
 
 /// Compares two arrays of equal length and equally many components; with a grid, places become voxels.
 fn array(a: &Array, b: &Array, grid: Option<&Grid>, tolerance: &Tolerance) -> ArrayComparison {
-    let count = a.values.len().min(b.values.len());
-    let (mut different, mut incomparable, mut largest, mut squares) = (0, 0, 0f64, 0f64);
-    let (mut first_incomparable, mut largest_at) = (None, None);
-    for i in 0..count {
-        let (x, y) = (a.values.get(i), b.values.get(i));
-        let difference = match (a.values.integer(i), b.values.integer(i)) {
-            (Some(x), Some(y)) => (x - y).abs() as f64,
-            _ if x == y || (x.is_nan() && y.is_nan()) => 0.0,
-            _ if !x.is_finite() || !y.is_finite() => {
-                (different, incomparable) = (different + 1, incomparable + 1);
-                first_incomparable.get_or_insert(i);
+    let mut differences = Differences::default();
+    differences.add(&a.values, &b.values, tolerance);
+    differences.finish(&a.name, a.components, grid, tolerance)
+}
+
+/// A number that differs: which, and both sides as text.
+type At = Option<(usize, [String; 2])>;
+
+/// How far two lists of numbers are apart, found block by block.
+#[derive(Debug, Default)]
+pub(super) struct Differences {
+    count: usize,
+    different: usize,
+    incomparable: usize,
+    largest: f64,
+    squares: f64,
+    first_incomparable: At,
+    largest_at: At,
+}
+
+impl Differences {
+    /// The next numbers of both.
+    pub fn add(&mut self, a: &Values, b: &Values, tolerance: &Tolerance) {
+        let (count, before) = (a.len().min(b.len()), self.count);
+        self.count += count;
+        let at = |i: usize| Some((before + i, [a.format(i), b.format(i)]));
+        for i in 0..count {
+            let (x, y) = (a.get(i), b.get(i));
+            let difference = match (a.integer(i), b.integer(i)) {
+                (Some(x), Some(y)) => (x - y).abs() as f64,
+                _ if x == y || (x.is_nan() && y.is_nan()) => 0.0,
+                _ if !x.is_finite() || !y.is_finite() => {
+                    self.different += 1;
+                    self.incomparable += 1;
+                    self.first_incomparable = self.first_incomparable.take().or_else(|| at(i));
+                    continue;
+                }
+                _ => (x - y).abs(),
+            };
+            if difference == 0.0 {
                 continue;
             }
-            _ => (x - y).abs(),
-        };
-        if difference == 0.0 {
-            continue;
-        }
-        different += usize::from(!tolerance.agree(difference, y));
-        squares += difference * difference;
-        if difference > largest {
-            (largest, largest_at) = (difference, Some(i));
+            self.different += usize::from(!tolerance.agree(difference, y));
+            self.squares += difference * difference;
+            if difference > self.largest {
+                (self.largest, self.largest_at) = (difference, at(i));
+            }
         }
     }
-    let comparable = count - incomparable;
-    let place = |i: usize| {
-        let (index, component) = (i / a.components.max(1), i % a.components.max(1));
-        let voxel = grid.map(|g| g.index(index));
-        Place { index, voxel, component, a: a.values.format(i), b: b.values.format(i) }
-    };
-    ArrayComparison {
-        name: a.name.clone(),
-        count,
-        different,
-        incomparable,
-        largest,
-        rms: if comparable == 0 { 0.0 } else { (squares / comparable as f64).sqrt() },
-        at: first_incomparable.or(largest_at).map(place),
-        same: different <= tolerance.max_different,
+
+    /// What was found; with a grid, places become voxels.
+    pub fn finish(self, name: &str, components: usize, grid: Option<&Grid>, tolerance: &Tolerance) -> ArrayComparison {
+        let comparable = self.count - self.incomparable;
+        let place = |(i, [a, b]): (usize, [String; 2])| {
+            let (index, component) = (i / components.max(1), i % components.max(1));
+            Place { index, voxel: grid.map(|g| g.index(index)), component, a, b }
+        };
+        ArrayComparison {
+            name: name.into(),
+            count: self.count,
+            different: self.different,
+            incomparable: self.incomparable,
+            largest: self.largest,
+            rms: if comparable == 0 { 0.0 } else { (self.squares / comparable as f64).sqrt() },
+            at: self.first_incomparable.or(self.largest_at).map(place),
+            same: self.different <= tolerance.max_different,
+        }
     }
 }
 

@@ -53,6 +53,16 @@ pub enum Error {
         /// Why they are so many.
         why: &'static str,
     },
+    /// More memory than there is.
+    #[error("{}: needs about {needed} bytes of memory, and {available} can be had; look at it on a larger machine, or at a part of it", path.display())]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// How much it needs.
+        needed: u64,
+        /// How much there is.
+        available: u64,
+    },
     /// A file that tells of no pipeline.
     #[error("{}: tells of no pipeline: {message}", path.display())]
     Pipeline {

@@ -9,12 +9,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::Error;
-use super::range::Short;
+use super::range::{BARS, Short, bar, histogram_line};
 use crate::io::image::{self, Axis, Positions, Request};
 use crate::io::{AtomicFile, InputError};
 
-/// Bars of the histogram.
-const BARS: usize = 16;
 /// Values that are looked at together.
 const BLOCK: usize = 1 << 16;
 
@@ -109,10 +107,9 @@ impl ImageSummary {
         })?;
         let mut histogram = vec![0u64; BARS];
         if numbers > 0 {
-            let bar = |value: f64| ((value - low) / (high - low) * BARS as f64).max(0.0) as usize;
             go_over(open()?.values, &mut |value| {
                 if value.is_finite() {
-                    histogram[bar(value).min(BARS - 1)] += 1;
+                    histogram[bar(value, low, high)] += 1;
                 }
             })?;
         }
@@ -201,8 +198,7 @@ impl fmt::Display for ImageSummary {
             Some([low, high, mean]) => {
                 let unit = self.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
                 writeln!(f, "values from {} to {}{unit}, mean {}", Short(*low), Short(*high), Short(*mean))?;
-                let bars: Vec<String> = self.histogram.iter().map(u64::to_string).collect();
-                writeln!(f, "in {BARS} equal parts of this range: {}", bars.join(" "))?;
+                writeln!(f, "{}", histogram_line(&self.histogram))?;
             }
             None => writeln!(f, "no value is a number")?,
         }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::image::ImageSummary;
+use super::image::{AxisSummary, ImageSummary};
 use super::range::Short;
 use super::surface::SurfaceSummary;
 use super::{ArraySummary, COLOURS, Contents, Error, OCCLUSION, Range};
@@ -44,6 +44,8 @@ pub enum Description {
         spacing: [f64; 3],
         /// The axes' directions, row by row.
         direction: [f64; 9],
+        /// The same as in other formats: the axes, from the first point on, and time, where the file says at which it is.
+        axes: Vec<AxisSummary>,
         /// Arrays with a tuple a point.
         point_arrays: Vec<ArraySummary>,
         /// Arrays with a tuple a cell.
@@ -101,18 +103,24 @@ impl Info {
     /// As [`Info::read`].
     pub fn read_array(path: &Path, array: Option<&str>) -> Result<Self, Error> {
         let bytes = std::fs::metadata(path).map_err(|cause| Error::Open { path: path.into(), cause })?.len();
-        let description = match is_measurement(path) {
+        let description = match crate::io::image::is_measurement(path) {
             true => Description::Grid(Box::new(ImageSummary::read(path, array)?)),
-            false => Description::of(&Contents::read(path)?),
+            false => match super::floats(path)? {
+                Some((floats, name, 3)) => Description::raw(floats.summary(name, 3)?),
+                Some((floats, name, components)) => {
+                    Description::Occlusion { values: floats.summary(name, components)?, sidecar: None }
+                }
+                None => {
+                    let contents = Contents::read(path)?;
+                    if let Contents::Mesh(mesh) = &contents {
+                        super::needs(path, SurfaceSummary::memory(mesh))?;
+                    }
+                    Description::of(&contents)
+                }
+            },
         };
         Ok(Self { path: path.into(), bytes, description })
     }
-}
-
-/// Whether a file's name is that of an image whose header tells more than VTK's would.
-fn is_measurement(path: &Path) -> bool {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    crate::io::image::is_image(path) && !matches!(ending.as_str(), "vti" | "raw" | "bin" | "dat")
 }
 
 impl Description {
@@ -127,10 +135,12 @@ impl Description {
             Contents::Occlusion(values, sidecar) => {
                 Self::Occlusion { values: list(OCCLUSION, 1, values), sidecar: sidecar.clone() }
             }
-            Contents::Raw(values) => {
-                Self::Raw { floats: values.len(), voxels: values.len() / 3, values: list(COLOURS, 3, values) }
-            }
+            Contents::Raw(values) => Self::raw(list(COLOURS, 3, values)),
         }
+    }
+
+    fn raw(values: ArraySummary) -> Self {
+        Self::Raw { floats: 3 * values.tuples, voxels: values.tuples, values }
     }
 
     fn image(image: &Image) -> Self {
@@ -139,8 +149,9 @@ impl Description {
             origin: image.grid.origin,
             spacing: image.grid.spacing,
             direction: image.direction,
-            point_arrays: summaries(&image.point_arrays),
-            cell_arrays: summaries(&image.cell_arrays),
+            axes: axes(image),
+            point_arrays: with_histograms(&image.point_arrays),
+            cell_arrays: with_histograms(&image.cell_arrays),
             field_data: fields(&image.field_data),
         }
     }
@@ -162,6 +173,36 @@ impl Description {
     }
 }
 
+/// The axes of an image of VTK.
+fn axes(image: &Image) -> Vec<AxisSummary> {
+    let axis = |(a, name): (usize, &'static str)| AxisSummary {
+        name: name.into(),
+        role: Some(name),
+        points: image.grid.dimensions[a],
+        first: 0.0,
+        last: (image.grid.dimensions[a] - 1) as f64 * image.grid.spacing[a],
+        even: true,
+        unit: None,
+        direction: Some(std::array::from_fn(|row| if row < 3 { image.direction[3 * row + a] } else { 0.0 })),
+    };
+    let mut axes: Vec<_> = ["x", "y", "z"].into_iter().enumerate().map(axis).collect();
+    axes.extend(image.time().map(|time| AxisSummary {
+        name: "time".into(),
+        role: Some("time"),
+        points: 1,
+        first: time,
+        last: time,
+        even: true,
+        unit: None,
+        direction: None,
+    }));
+    axes
+}
+
+fn with_histograms(arrays: &[Array]) -> Vec<ArraySummary> {
+    arrays.iter().map(ArraySummary::with_histogram).collect()
+}
+
 fn summaries(arrays: &[Array]) -> Vec<ArraySummary> {
     arrays.iter().map(ArraySummary::of).collect()
 }
@@ -180,12 +221,15 @@ impl fmt::Display for Description {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Grid(image) => image.fmt(f),
-            Self::Image { dimensions, origin, spacing, direction, point_arrays, cell_arrays, field_data } => {
+            Self::Image { dimensions, origin, spacing, direction, axes, point_arrays, cell_arrays, field_data } => {
                 let [x, y, z] = dimensions;
                 writeln!(f, "an image of {x} x {y} x {z} points")?;
                 writeln!(f, "origin {}, spacing {}", Tuple(origin), Tuple(spacing))?;
                 if *direction != [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] {
                     writeln!(f, "rotated, direction {}", Tuple(direction))?;
+                }
+                if let Some(time) = axes.iter().find(|axis| axis.role == Some("time")) {
+                    writeln!(f, "at time {}", time.first)?;
                 }
                 lines(f, "points", point_arrays)?;
                 lines(f, "cells", cell_arrays)?;
@@ -227,7 +271,13 @@ fn lines(f: &mut fmt::Formatter<'_>, of: &str, arrays: &[ArraySummary]) -> fmt::
     if !arrays.is_empty() {
         writeln!(f, "on {of}:")?;
     }
-    arrays.iter().try_for_each(|array| writeln!(f, "  {array}"))
+    arrays.iter().try_for_each(|array| {
+        writeln!(f, "  {array}")?;
+        match array.histogram_line() {
+            Some(line) => writeln!(f, "    {line}"),
+            None => Ok(()),
+        }
+    })
 }
 
 fn field_lines(f: &mut fmt::Formatter<'_>, fields: &Map<String, Value>) -> fmt::Result {

@@ -5,7 +5,8 @@
 //!
 //! | file | read as |
 //! | --- | --- |
-//! | `.vti`, `.vtu`, `.vtp`, `.vtk` | an image or a mesh, as [`crate::io::vtk`] reads it |
+//! | `.vti`, `.vtu`, `.vtp`, `.vtk`, `.pvti`, `.pvtu`, `.pvtp` | an image or a mesh, as [`crate::io::vtk`] reads it |
+//! | `.pvd`, `.vti.series` | images over time, described but not compared, or one mesh |
 //! | `.stl`, `.obj`, `.ply`, `.msh` | a mesh, with the cells that the file has |
 //! | `.nii`, `.nrrd`, `.nc`, `.tif` | an image, described but not compared ([`image`]) |
 //! | `.f32` | values at vertices, and what the sidecar says about them if there is one |
@@ -16,13 +17,14 @@
 
 pub mod compare;
 mod error;
+mod floats;
 pub mod image;
 mod info;
 mod pipeline;
 mod range;
 pub mod surface;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use error::Error;
 pub use info::{Description, Info};
@@ -30,10 +32,11 @@ pub use pipeline::pipeline;
 pub use range::{ArraySummary, Range};
 
 use self::compare::{Comparison, Tolerance};
+use self::floats::Floats;
 use crate::io::vtk::{self, DataSet, Field, Image, UnstructuredGrid, Wanted};
 use crate::io::{Input, InputError};
 use crate::occlusion::{self, Sidecar};
-use crate::volume::{Array, Kind, Values};
+use crate::volume::{Array, Kind, Values, available_memory};
 
 /// What values at vertices are called, here as in the files of meshes.
 const OCCLUSION: &str = "ambient_occlusion";
@@ -59,12 +62,15 @@ impl Contents {
     /// # Errors
     /// If it can't be read, is damaged, cut short, or of a kind that isn't known here.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let ending = ending(path);
+        if ENDINGS.contains(&ending.as_str()) {
+            check_memory(path, BYTES_IN_MEMORY)?;
+        }
         match ending.as_str() {
             "f32" => occlusion_file(path),
-            "raw" => numbers(path, 12, "colours are three floats of four bytes each").map(Self::Raw),
-            "stl" | "ply" | "obj" | "msh" => mesh(path).map(Self::Mesh),
-            "vti" | "vtu" | "vtp" | "vtk" | "xml" => Ok(match vtk::read(path)? {
+            "raw" => numbers(path, RAW_UNIT, RAW_WHY).map(Self::Raw),
+            "stl" | "ply" | "obj" | "msh" | "pvd" | "series" => mesh(path).map(Self::Mesh),
+            "vti" | "vtu" | "vtp" | "pvti" | "pvtu" | "pvtp" | "vtk" | "xml" => Ok(match vtk::read(path)? {
                 DataSet::Image(image) => Self::Image(image),
                 DataSet::Unstructured(mesh) => Self::Mesh(mesh),
             }),
@@ -110,6 +116,12 @@ impl Contents {
 /// # Errors
 /// If one can't be read, if they hold different kinds of things, or if neither has an array that is asked for.
 pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, Error> {
+    if let (Some((x, name, _)), Some((y, other, _))) = (floats(a)?, floats(b)?)
+        && name == other
+        && tolerance.takes_all_of(name)
+    {
+        return x.compare(y, name, tolerance);
+    }
     let (first, second) = (Contents::read(a)?, Contents::read(b)?);
     let mut known = first.array_names();
     known.extend(second.array_names().into_iter().filter(|name| !first.array_names().contains(name)));
@@ -130,6 +142,54 @@ pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, 
     })
 }
 
+/// What files are read as a whole.
+const ENDINGS: [&str; 16] = [
+    "f32", "raw", "stl", "ply", "obj", "msh", "pvd", "series", "vti", "vtu", "vtp", "pvti", "pvtu", "pvtp", "vtk",
+    "xml",
+];
+/// How many bytes of memory a byte of a file takes at least, while it is read.
+const BYTES_IN_MEMORY: u64 = 3;
+/// Bytes of a colour.
+const RAW_UNIT: usize = 12;
+const RAW_WHY: &str = "colours are three floats of four bytes each";
+/// Bytes of a value at a vertex.
+const VALUE_UNIT: usize = 4;
+const VALUE_WHY: &str = "values are floats of four bytes each";
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// A file of floats that nothing but its name tells about, to be looked at block by block; none of any other file.
+fn floats(path: &Path) -> Result<Option<(Floats, &'static str, usize)>, Error> {
+    Ok(match ending(path).as_str() {
+        "raw" => Some((Floats::open(path, RAW_UNIT, RAW_WHY)?, COLOURS, 3)),
+        "f32" if !beside(path).exists() => Some((Floats::open(path, VALUE_UNIT, VALUE_WHY)?, OCCLUSION, 1)),
+        _ => None,
+    })
+}
+
+/// Refuses a file that takes more memory than there is: so many bytes for each of its own.
+fn check_memory(path: &Path, times: u64) -> Result<(), Error> {
+    let bytes = crate::input::length(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
+    needs(path, bytes.saturating_mul(times))
+}
+
+/// Refuses what takes more memory than there is.
+fn needs(path: &Path, needed: u64) -> Result<(), Error> {
+    match available_memory().filter(|&available| available < needed) {
+        Some(available) => Err(Error::Memory { path: path.into(), needed, available }),
+        None => Ok(()),
+    }
+}
+
+/// The sidecar's path.
+fn beside(path: &Path) -> PathBuf {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".yaml");
+    beside.into()
+}
+
 /// All floats of a file whose length is a multiple of `unit` bytes.
 fn numbers(path: &Path, unit: usize, why: &'static str) -> Result<Values, Error> {
     let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
@@ -141,11 +201,9 @@ fn numbers(path: &Path, unit: usize, why: &'static str) -> Result<Values, Error>
 
 /// With a sidecar the file must be what that says; without one it is a list of floats, whatever they are.
 fn occlusion_file(path: &Path) -> Result<Contents, Error> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".yaml");
-    let beside = Path::new(&beside);
+    let beside = &beside(path);
     if !beside.exists() {
-        return Ok(Contents::Occlusion(numbers(path, 4, "values are floats of four bytes each")?, None));
+        return Ok(Contents::Occlusion(numbers(path, VALUE_UNIT, VALUE_WHY)?, None));
     }
     let text = crate::input::read_text(beside).map_err(|cause| Error::Open { path: beside.into(), cause })?;
     let bytes = crate::input::read(path).map_err(|cause| Error::Open { path: path.into(), cause })?;

@@ -23,6 +23,17 @@ pub struct ArraySummary {
     pub tuples: usize,
     /// Of each component.
     pub ranges: Vec<Range>,
+    /// How many numbers there are in each of equal parts of the range; of images' arrays of one number a tuple only.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub histogram: Vec<u64>,
+}
+
+/// Bars of a histogram.
+pub(super) const BARS: usize = 16;
+
+/// The bar that a finite number belongs to.
+pub(super) fn bar(value: f64, low: f64, high: f64) -> usize {
+    (((value - low) / (high - low) * BARS as f64).max(0.0) as usize).min(BARS - 1)
 }
 
 /// What the numbers of one component are like.
@@ -43,22 +54,40 @@ pub struct Range {
 impl Range {
     /// Of these numbers.
     pub fn of(numbers: impl Iterator<Item = f64>) -> Self {
-        let mut range = Self::default();
-        let (mut sum, mut count) = (0.0, 0usize);
-        for x in numbers {
-            if x.is_nan() {
-                range.nan += 1;
-            } else if x.is_infinite() {
-                range.infinite += 1;
-            } else {
-                range.min = Some(range.min.map_or(x, |m: f64| m.min(x)));
-                range.max = Some(range.max.map_or(x, |m: f64| m.max(x)));
-                sum += x;
-                count += 1;
-            }
+        let mut tally = Tally::default();
+        numbers.for_each(|x| tally.add(x));
+        tally.range()
+    }
+}
+
+/// A range in the making.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tally {
+    range: Range,
+    sum: f64,
+    count: usize,
+}
+
+impl Tally {
+    /// One more number.
+    pub fn add(&mut self, x: f64) {
+        let range = &mut self.range;
+        if x.is_nan() {
+            range.nan += 1;
+        } else if x.is_infinite() {
+            range.infinite += 1;
+        } else {
+            range.min = Some(range.min.map_or(x, |m: f64| m.min(x)));
+            range.max = Some(range.max.map_or(x, |m: f64| m.max(x)));
+            self.sum += x;
+            self.count += 1;
         }
-        range.mean = (count > 0).then(|| sum / count as f64);
-        range
+    }
+
+    /// Of all numbers so far.
+    pub fn range(mut self) -> Range {
+        self.range.mean = (self.count > 0).then(|| self.sum / self.count as f64);
+        self.range
     }
 }
 
@@ -73,8 +102,32 @@ impl ArraySummary {
             components,
             tuples: array.tuples(),
             ranges: (0..components).map(component).collect(),
+            histogram: Vec::new(),
         }
     }
+
+    /// The same with a histogram, where a tuple is one number.
+    pub fn with_histogram(array: &Array) -> Self {
+        let mut summary = Self::of(array);
+        if let ([Range { min: Some(low), max: Some(high), .. }], 1) = (summary.ranges.as_slice(), array.components) {
+            let mut histogram = vec![0u64; BARS];
+            let values = (0..array.values.len()).map(|i| array.values.get(i));
+            values.filter(|x| x.is_finite()).for_each(|x| histogram[bar(x, *low, *high)] += 1);
+            summary.histogram = histogram;
+        }
+        summary
+    }
+
+    /// The histogram in words.
+    pub(super) fn histogram_line(&self) -> Option<String> {
+        (!self.histogram.is_empty()).then(|| histogram_line(&self.histogram))
+    }
+}
+
+/// How many values there are in each part of their range.
+pub(super) fn histogram_line(bars: &[u64]) -> String {
+    let counts: Vec<String> = bars.iter().map(u64::to_string).collect();
+    format!("in {BARS} equal parts of this range: {}", counts.join(" "))
 }
 
 impl fmt::Display for Range {

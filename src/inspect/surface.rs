@@ -98,6 +98,12 @@ impl SurfaceSummary {
         }
     }
 
+    /// Bytes of memory that it takes to find out, about: lists of all faces of all simplices are sorted.
+    pub fn memory(mesh: &UnstructuredGrid) -> u64 {
+        let (points, corners) = (mesh.points.len() as u64, mesh.connectivity.len() as u64);
+        points.saturating_mul(80).saturating_add(corners.saturating_mul(80))
+    }
+
     fn new<const D: usize>(form: Form, points: &[Vector64<D>], simplices: &[[u32; D]]) -> Option<Self> {
         let out_of_range = simplices.as_flattened().iter().any(|&v| v as usize >= points.len());
         if out_of_range || points.iter().flatten().any(|x| x.is_nan() || x.abs() > LARGEST) {

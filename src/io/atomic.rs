@@ -2,12 +2,15 @@
 //!
 //! Bytes go to a temporary file beside the final one, hence on the same disk, and [`AtomicFile::commit`] renames it. A
 //! file that is dropped before that takes its temporary file with it, so a failed or cancelled run leaves what was
-//! there before. Only a process that is killed outright leaves a `.NAME.*.partial` behind. The rename survives the
+//! there before. A process that can't wait for that calls [`abandon`] before it ends. Only one that is killed outright
+//! leaves a `.NAME.*.partial` behind. The rename survives the
 //! process, but a power failure right after it may still lose what the system had not yet written.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
 
 use tempfile::NamedTempFile;
 
@@ -16,11 +19,57 @@ use super::Error;
 /// Bytes collected before the system is asked to write.
 const BUFFER: usize = 1 << 18;
 
+/// Files that have to go if the process ends before they are whole.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// Held while files that belong together get their final names.
+static TOGETHER: RwLock<()> = RwLock::new(());
+
+/// A file, or a folder if it is empty then, that goes with the process, should that be ended in the middle of its work.
+#[derive(Debug)]
+pub struct Unfinished(PathBuf);
+
+impl Unfinished {
+    /// Remembers a file until this is dropped.
+    pub fn new(path: PathBuf) -> Self {
+        unfinished().insert(path.clone());
+        Self(path)
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        unfinished().remove(&self.0);
+    }
+}
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Files that get their final names while this is held do so all, or none of them.
+#[must_use]
+pub fn together() -> RwLockReadGuard<'static, ()> {
+    TOGETHER.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Takes away all files that aren't whole, and folders that were made for them. From then on no file gets its final name, and who tries to waits for ever: the
+/// process is to end at once.
+pub fn abandon() {
+    std::mem::forget(TOGETHER.write());
+    let files = unfinished();
+    // What is in a folder goes before the folder.
+    for path in files.iter().rev() {
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
+    }
+    std::mem::forget(files);
+}
+
 /// A file that does not exist until it is committed.
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
     file: BufWriter<NamedTempFile>,
+    unfinished: Unfinished,
 }
 
 impl AtomicFile {
@@ -49,8 +98,14 @@ impl AtomicFile {
         // A temporary file is its owner's alone by default; the final file should be as any other.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let file = builder.tempfile_in(folder).map_err(failed("be written", &path))?;
-        Ok(Self { path, file: BufWriter::with_capacity(BUFFER, file) })
+        let file = {
+            let mut files = unfinished();
+            let file = builder.tempfile_in(folder).map_err(failed("be written", &path))?;
+            files.insert(file.path().to_owned());
+            file
+        };
+        let unfinished = Unfinished(file.path().to_owned());
+        Ok(Self { path, file: BufWriter::with_capacity(BUFFER, file), unfinished })
     }
 
     /// The final path.
@@ -71,7 +126,9 @@ impl AtomicFile {
         self.file.flush().map_err(failed("be written"))?;
         let length = self.file.seek(SeekFrom::End(0)).map_err(failed("be written"))?;
         let file = self.file.into_inner().map_err(|e| failed("be written")(e.into_error()))?;
+        let mut files = unfinished();
         let _: File = file.persist(&path).map_err(|e| failed("be put in place")(e.error))?;
+        files.remove(&self.unfinished.0);
         Ok(length)
     }
 

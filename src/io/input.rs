@@ -55,7 +55,7 @@ impl InputError {
 /// A file that an object names, and by which key.
 #[derive(Clone, Debug)]
 pub struct Input {
-    key: String,
+    pub(super) key: String,
     pub(super) path: PathBuf,
 }
 

@@ -4,7 +4,8 @@
 //! | --- | --- | --- |
 //! | meshes read | `.stl`, `.obj`, `.ply`, `.msh`, `.vtk`, `.vtp`, `.vtu` | [`mesh`] |
 //! | images read | `.vti`, `.raw`, `.nii`, `.tif`, `.nc`, `.nrrd` | [`image`] |
-//! | VTK's files read, as one model | `.vti`, `.vtu`, `.vtp`, legacy `.vtk` | [`vtk`] |
+//! | VTK's files read, as one model | `.vti`, `.vtu`, `.vtp`, each also in pieces, legacy `.vtk` | [`vtk`] |
+//! | lists of files over time read | `.pvd`, `.vti.series` | [`series`] |
 //! | images written | `.vti`, `.raw`, `.png` | [`vti`], [`raw`], [`png`] |
 //! | meshes and sequences written | `.vtu`, `.pvd` | [`vtu`], [`pvd`] |
 //! | figures for ParaView written | a script that finds its images beside itself | [`paraview`] |
@@ -22,6 +23,7 @@ pub mod paraview;
 pub mod png;
 pub mod pvd;
 pub mod raw;
+pub mod series;
 pub mod vti;
 pub mod vtk;
 pub mod vtu;
@@ -30,6 +32,6 @@ mod xml;
 /// The name under which files tell of the pipeline that they were made by.
 pub const PIPELINE: &str = "pipeline";
 
-pub use atomic::{AtomicFile, check_free_space, check_writable, free_space};
+pub use atomic::{AtomicFile, Unfinished, abandon, check_free_space, check_writable, free_space, together};
 pub use error::Error;
 pub use input::{Input, InputError};

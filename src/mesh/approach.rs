@@ -15,24 +15,30 @@ use crate::geometry::{Vector, Vector64, narrow, normal_of, widen};
 /// vertex's own simplices, else none of it. The first is right in folds down to a degree.
 const SHARES: [f64; 4] = [64.0, 16.0, 4.0, 1.0];
 
-/// The direction d for a vertex; `around` are the simplices with a corner in its place, without those of measure zero.
+/// The direction d for a vertex; `around` are the simplices with a corner in its place, as [`super::Incidence`] has them.
+/// A simplex is the vertex's own if it, or one that lies on it, has the vertex's normal there.
 pub fn approach<const D: usize>(mesh: &Mesh<D>, around: &[u32], vertex: u32) -> Vector<D> {
     let (normal, identity) = (mesh.normals[vertex as usize], mesh.identity[vertex as usize]);
     let object = mesh.objects.partition_point(|o| o.vertices.end <= vertex as usize);
     let Some(object) = mesh.objects.get(object) else { return normal };
-    let is_own = |simplex: &u32| {
-        let corners = mesh.simplices[*simplex as usize];
-        corners.iter().any(|&v| {
+    let has_it = |simplex: u32| {
+        mesh.simplices[simplex as usize].iter().any(|&v| {
             let v = v as usize;
             mesh.identity[v] == identity && object.vertices.contains(&v) && mesh.normals[v] == normal
         })
     };
-    if around.iter().all(is_own) {
+    // The one in this place that is the vertex's own.
+    let own = |&first: &u32| {
+        let of_object = || mesh.copies.members_within(first, &object.simplices).find(|&s| has_it(s));
+        if has_it(first) { Some(first) } else { of_object() }
+    };
+    let owned: Vec<u32> = around.iter().filter_map(own).collect();
+    if owned.len() == around.len() {
         return normal;
     }
     let point = widen(&mesh.vertices[vertex as usize]);
     let corners = |simplex: u32| mesh.corners(simplex).map(|v| widen(&v));
-    let inwards: Vec<Vector64<D>> = (around.iter().filter(|s| is_own(s)))
+    let inwards: Vec<Vector64<D>> = (owned.iter())
         .filter_map(|&s| {
             let corners = corners(s);
             let sum = corners.iter().fold(Vector64::zeros(), |sum, v| sum + (v - point));
@@ -44,7 +50,7 @@ pub fn approach<const D: usize>(mesh: &Mesh<D>, around: &[u32], vertex: u32) -> 
     let Some(inward) = inwards.iter().max_by(|a, b| a.dot(&middle).total_cmp(&b.dot(&middle))) else { return normal };
     let up = widen(&normal);
     let is_above = |d: &Vector64<D>, least: f64| {
-        (around.iter().filter(|s| is_own(s))).all(|&s| unit(normal_of(&corners(s))).is_none_or(|n| n.dot(d) >= least))
+        owned.iter().all(|&s| unit(normal_of(&corners(s))).is_none_or(|n| n.dot(d) >= least))
     };
     let ways = SHARES.iter().map(|share| (inward + up / *share, 0.5 / share));
     ways.into_iter().find(|(d, least)| is_above(d, *least)).map_or(normal, |(d, _)| narrow(&d.normalize()))

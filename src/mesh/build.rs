@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::copies::Sides;
 use super::corners::{self, Corners};
-use super::{Crease, Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding};
+use super::{Copies, Crease, Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding};
 use crate::geometry::{Vector, is_degenerate, narrow};
 use crate::progress::{Progress, Silent};
 
@@ -109,23 +110,40 @@ impl<const D: usize> MeshBuilder<D> {
         mesh.normals = vec![Vector::zeros(); mesh.vertices.len()];
         mesh.degenerate =
             (0..mesh.simplices.len() as u32).into_par_iter().filter(|&s| is_degenerate(&mesh.corners(s))).collect();
+        let flat = |s: u32| mesh.degenerate.binary_search(&s).is_ok();
+        let places: Vec<[u32; D]> = (0..mesh.simplices.len() as u32).map(|s| mesh.places_of(s)).collect();
+        mesh.copies = Copies::find(&places, |s| !flat(s));
+        drop(places);
+        for (i, added) in self.added.iter().enumerate() {
+            if progress.cancelled() {
+                return None;
+            }
+            let simplices = mesh.objects[i].simplices.clone();
+            let (components, closed) = orientation::orient(&mut mesh, simplices, &added.open);
+            (mesh.objects[i].components, mesh.objects[i].closed_components) = (components, closed);
+        }
+        let sides = Sides::find(&mesh);
         let mut splits = Vec::with_capacity(self.added.len());
-        for (i, Added { open, crease, normals: given }) in self.added.into_iter().enumerate() {
+        for (i, Added { crease, normals: given, .. }) in self.added.into_iter().enumerate() {
             let (vertices, simplices) = (mesh.objects[i].vertices.clone(), mesh.objects[i].simplices.clone());
             if progress.cancelled() {
                 return None;
             }
-            let (components, closed) = orientation::orient(&mut mesh, simplices.clone(), &open);
-            (mesh.objects[i].components, mesh.objects[i].closed_components) = (components, closed);
             let angle = match (&given, crease) {
-                (Some(_), _) | (None, Crease::Never) => None,
-                (None, Crease::Above(degrees)) => Some(degrees),
-                (None, Crease::Rough) => Some(corners::rough_angle(&mesh, simplices.clone())),
+                (Some(_), _) => None,
+                // A vertex has one normal, but not for both sides of a sheet.
+                (None, Crease::Never) => {
+                    let sheets =
+                        sides.any_two_sided(&simplices) || corners::has_flat_folds(&mesh, simplices.clone(), &sides);
+                    sheets.then_some(None)
+                }
+                (None, Crease::Above(degrees)) => Some(Some(degrees)),
+                (None, Crease::Rough) => Some(Some(corners::rough_angle(&mesh, simplices.clone()))),
             };
             splits.push(match angle {
-                Some(degrees) => corners::split(&mesh, vertices, simplices, degrees),
+                Some(degrees) => corners::split(&mesh, vertices, simplices, degrees, &sides),
                 None => {
-                    normals::set_vertex_normals(&mut mesh, vertices.clone(), simplices);
+                    normals::set_vertex_normals(&mut mesh, vertices.clone(), simplices, &sides);
                     let own = given.unwrap_or_else(|| mesh.normals[vertices].to_vec());
                     Corners { sources: Vec::new(), normals: own, moved: Vec::new() }
                 }

@@ -6,18 +6,26 @@
 //! group has a normal of its own, the measure-weighted one. The first group keeps the vertex; for each other one a vertex
 //! with the same coordinates is added behind all vertices of the object, so that those of the input keep their numbers.
 //!
+//! A sheet with two sides, each simplex listed in either order, is split between them whatever the angle.
+//!
 //! Intersection knows points by their coordinates and does not notice. Simplices of measure zero have no normal and
 //! decide nothing: what they lie between counts as neighbours.
 
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::copies::Sides;
+use super::facets::{Corners as Facets, facets_of};
 use super::{Mesh, UnionFind, normals::unit};
 use crate::geometry::{Dimension, Vector, Vector64, normal_of, widen};
 
 /// Crease angle where nothing else is said, in degrees: the feature angle of VTK.
 pub const DEFAULT_ANGLE: f64 = 30.0;
+
+/// Normals whose cosine is below minus this point opposite ways.
+const COSINE_OF_SIDES: f64 = 1.0 - 1e-6;
 
 /// Where an object's vertices are split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,30 +64,25 @@ struct Use<const D: usize> {
     corners: Vec<(u32, usize)>,
 }
 
-/// Splits the vertices of one object, whose simplices are oriented already.
+/// Splits the vertices of one object, whose simplices are oriented already: where neighbours' normals differ by more than this
+/// angle, or, without one, between the sides of sheets only.
 pub(super) fn split<const D: usize>(
     mesh: &Mesh<D>,
     vertices: Range<usize>,
     simplices: Range<usize>,
-    degrees: f64,
+    degrees: Option<f64>,
+    sides: &Sides,
 ) -> Corners<D> {
     let normals: Vec<Vector64<D>> = mesh.simplices[simplices.clone()].par_iter().map(|s| normal(mesh, s)).collect();
     let first = simplices.start;
     let flat = |s: u32| mesh.degenerate.binary_search(&s).is_ok();
-    let mut corners: Vec<Corner> = (simplices.clone())
-        .flat_map(|s| {
-            (0..D).map(move |place| {
-                let identity = mesh.identity[mesh.simplices[s][place] as usize];
-                Corner { identity, simplex: s as u32, place: place as u8 }
-            })
-        })
-        .collect();
-    corners.par_sort_unstable();
+    let corners = corners(mesh, simplices.clone());
     let stars: Vec<&[Corner]> = corners.chunk_by(|a, b| a.identity == b.identity).collect();
     // Coordinates are single precision: angles that are equal but for their rounding are equal.
-    let cosine = libm::cos(degrees.to_radians()) - 1e-6;
-    let uses: Vec<Vec<Use<D>>> =
-        (stars.par_iter()).map(|star| groups(mesh, star, cosine, &|s| normals[s as usize - first], &flat)).collect();
+    let cosine = degrees.map(|degrees| libm::cos(degrees.to_radians()) - 1e-6);
+    let uses: Vec<Vec<Use<D>>> = (stars.par_iter())
+        .map(|star| groups(mesh, star, cosine, &|s| normals[s as usize - first], &flat, sides))
+        .collect();
 
     let mut found = Corners { sources: Vec::new(), normals: vec![Vector::zeros(); vertices.len()], moved: Vec::new() };
     let mut taken = vec![false; vertices.len()];
@@ -142,28 +145,44 @@ fn agree<const D: usize>(a: &Vector64<D>, b: &Vector64<D>, cosine: f64) -> bool 
     a.dot(&b) >= cosine * a.norm() * b.norm()
 }
 
-/// The groups of the corners at one point, each vertex that a group uses apart, the group of the lowest simplex first.
+/// The groups of the corners at one point, each vertex that a group uses apart, the group of the lowest simplex first; of a
+/// sheet with two sides, the groups by their normals.
 fn groups<const D: usize>(
     mesh: &Mesh<D>,
     star: &[Corner],
-    cosine: f64,
+    cosine: Option<f64>,
     normal: &impl Fn(u32) -> Vector64<D>,
     flat: &impl Fn(u32) -> bool,
+    sides: &Sides,
 ) -> Vec<Use<D>> {
     let mut sets = UnionFind::new(star.len());
-    for pair in neighbours(mesh, star, flat) {
-        let [a, b] = pair.map(|i| normal(star[i as usize].simplex));
-        if agree(&a, &b, cosine) {
+    let cancels = cosine.is_none_or(|cosine| cosine < -COSINE_OF_SIDES) && has_opposed(star, normal, flat, sides);
+    let two_sided = cancels || star.iter().any(|c| sides.is_two_sided(c.simplex));
+    for pair in neighbours(mesh, star, flat, sides) {
+        let simplices = pair.map(|i| star[i as usize].simplex);
+        let [a, b] = simplices.map(normal);
+        let sides = || is_opposed(&a, &b) || are_sides(mesh, simplices);
+        if cosine.is_none_or(|cosine| agree(&a, &b, cosine)) && !(two_sided && sides()) {
             sets.join(pair[0], pair[1]);
+        }
+    }
+    if cosine.is_none() && !two_sided {
+        (1..star.len() as u32).for_each(|i| sets.join(0, i));
+    }
+    for (i, corner) in star.iter().enumerate() {
+        let place = |leader: u32| star.binary_search_by_key(&leader, |c| c.simplex).ok();
+        if let Some(leader) = sides.leader(corner.simplex).and_then(place) {
+            sets.join(i as u32, leader as u32);
         }
     }
     let mut members: Vec<(u32, usize)> = (0..star.len()).map(|i| (sets.root(i as u32), i)).collect();
     members.sort_unstable();
-    let mut found: Vec<Use<D>> = Vec::new();
+    let mut groups: Vec<(Vector<D>, Vec<Corner>)> = Vec::new();
     let mut at_rest = Vec::new();
     for group in members.chunk_by(|a, b| a.0 == b.0) {
         let corners = || group.iter().map(|&(_, i)| star[i]).filter(|c| !flat(c.simplex));
-        let sum = corners().fold(Vector64::<D>::zeros(), |sum, c| sum + normal(c.simplex));
+        let counted = corners().filter(|c| sides.leader(c.simplex).is_none());
+        let sum = counted.fold(Vector64::<D>::zeros(), |sum, c| sum + normal(c.simplex));
         let Some(leader) = corners().next() else {
             at_rest.extend(group.iter().map(|&(_, i)| star[i]));
             continue;
@@ -171,38 +190,104 @@ fn groups<const D: usize>(
         // A closed fan folded onto itself has none of its own.
         let leading = normal(leader.simplex);
         let sum = if sum.amax() > 1e-12 * leading.amax() { sum } else { leading };
-        let unit = unit(&sum);
-        let start = found.len();
-        for c in corners() {
+        groups.push((unit(&sum), corners().collect()));
+    }
+    if two_sided {
+        // Not in the order of the simplices, so that it doesn't matter which side is listed first.
+        let place = |normal: &Vector<D>| normal.map(|x| -x);
+        groups.sort_by(|a, b| place(&a.0).partial_cmp(&place(&b.0)).unwrap_or(std::cmp::Ordering::Equal));
+    }
+    let mut found: Vec<Use<D>> = Vec::new();
+    for (normal, corners) in groups {
+        let mut slots: HashMap<u32, usize> = HashMap::new();
+        for c in corners {
             let vertex = mesh.simplices[c.simplex as usize][usize::from(c.place)];
-            let slot = match found[start..].iter().position(|u| u.vertex == vertex) {
-                Some(slot) => start + slot,
-                None => {
-                    found.push(Use { vertex, normal: unit, corners: Vec::new() });
-                    found.len() - 1
-                }
-            };
+            let slot = *slots.entry(vertex).or_insert_with(|| {
+                found.push(Use { vertex, normal, corners: Vec::new() });
+                found.len() - 1
+            });
             found[slot].corners.push((c.simplex, usize::from(c.place)));
         }
     }
     // A vertex of simplices of measure zero alone has the normal of the point's first group.
     let normal = found.first().map_or_else(Vector::zeros, |u| u.normal);
+    let mut used: HashSet<u32> =
+        if at_rest.is_empty() { HashSet::new() } else { found.iter().map(|u| u.vertex).collect() };
     for c in at_rest {
         let vertex = mesh.simplices[c.simplex as usize][usize::from(c.place)];
-        if found.iter().all(|u| u.vertex != vertex) {
+        if used.insert(vertex) {
             found.push(Use { vertex, normal, corners: Vec::new() });
         }
     }
     found
 }
 
+/// Whether two normals point opposite ways.
+fn is_opposed<const D: usize>(a: &Vector64<D>, b: &Vector64<D>) -> bool {
+    a.amax() > 0.0 && b.amax() > 0.0 && agree(a, &-b, COSINE_OF_SIDES)
+}
+
+/// Whether two simplices around a point lie in one hyperplane and face opposite ways: the sides of a sheet that is folded
+/// flat, or that two copies make which are cut into simplices in different ways.
+fn has_opposed<const D: usize>(
+    star: &[Corner],
+    normal: &impl Fn(u32) -> Vector64<D>,
+    flat: &impl Fn(u32) -> bool,
+    sides: &Sides,
+) -> bool {
+    let counts = |c: &&Corner| !flat(c.simplex) && sides.leader(c.simplex).is_none();
+    let normals: Vec<Vector64<D>> = star.iter().filter(counts).map(|c| normal(c.simplex)).collect();
+    // Most points have normals that hardly cancel.
+    let (sum, lengths) =
+        normals.iter().fold((Vector64::<D>::zeros(), 0.0), |(sum, lengths), n| (sum + n, lengths + n.norm()));
+    sum.norm() < 0.99 * lengths && (1..normals.len()).any(|i| normals[..i].iter().any(|n| is_opposed(n, &normals[i])))
+}
+
+/// Whether an object has points with simplices in one hyperplane that face opposite ways.
+pub(super) fn has_flat_folds<const D: usize>(mesh: &Mesh<D>, simplices: Range<usize>, sides: &Sides) -> bool {
+    let flat = |s: u32| mesh.degenerate.binary_search(&s).is_ok();
+    let corners = corners(mesh, simplices);
+    let stars: Vec<&[Corner]> = corners.chunk_by(|a, b| a.identity == b.identity).collect();
+    stars.par_iter().any(|star| has_opposed(star, &|s| normal(mesh, &mesh.simplices[s as usize]), &flat, sides))
+}
+
+/// All corners of some simplices, those at one point together.
+fn corners<const D: usize>(mesh: &Mesh<D>, simplices: Range<usize>) -> Vec<Corner> {
+    let mut corners: Vec<Corner> = simplices
+        .flat_map(|s| {
+            (0..D).map(move |place| {
+                let identity = mesh.identity[mesh.simplices[s][place] as usize];
+                Corner { identity, simplex: s as u32, place: place as u8 }
+            })
+        })
+        .collect();
+    corners.par_sort_unstable();
+    corners
+}
+
+/// Whether two neighbours are on different sides of a sheet: one lies on the other, or they run the same way along the facet
+/// that they share.
+fn are_sides<const D: usize>(mesh: &Mesh<D>, simplices: [u32; 2]) -> bool {
+    let [a, b] = simplices.map(|s| mesh.places_of(s));
+    if a.iter().all(|v| b.contains(v)) {
+        return true;
+    }
+    let shared = |(facet, turned): (Facets, bool)| facets_of(&b).find(|other| other.0 == facet).map(|b| b.1 == turned);
+    facets_of(&a).find_map(shared).unwrap_or(false)
+}
+
 /// Pairs of places in the star whose simplices share a facet that holds the point; those of measure zero are left out,
-/// and the facets that they connect count as one.
-fn neighbours<const D: usize>(mesh: &Mesh<D>, star: &[Corner], flat: &impl Fn(u32) -> bool) -> Vec<[u32; 2]> {
+/// and the facets that they connect count as one. So are those that others stand for.
+fn neighbours<const D: usize>(
+    mesh: &Mesh<D>,
+    star: &[Corner],
+    flat: &impl Fn(u32) -> bool,
+    sides: &Sides,
+) -> Vec<[u32; 2]> {
     let point = star[0].identity;
     // What is left of a facet without the point: one vertex in 3D, two in 4D.
     let mut facets: Vec<([u32; 2], u32)> = Vec::with_capacity(star.len() * (D - 1));
-    for (i, corner) in star.iter().enumerate() {
+    for (i, corner) in star.iter().enumerate().filter(|(_, corner)| sides.leader(corner.simplex).is_none()) {
         let mut others = [u32::MAX; 3];
         let simplex = mesh.simplices[corner.simplex as usize].map(|v| mesh.identity[v as usize]);
         let rest = simplex.into_iter().filter(|&v| v != point);

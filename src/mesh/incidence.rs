@@ -3,7 +3,7 @@
 use super::Mesh;
 
 /// For every point, found by its identity, the simplices of any object that have it as a corner, ascending; those of
-/// measure zero are left out.
+/// measure zero are left out, and of those that lie one on the other all but the first.
 #[derive(Clone, Debug)]
 pub struct Incidence {
     starts: Vec<u32>,
@@ -13,12 +13,13 @@ pub struct Incidence {
 impl Incidence {
     /// Collects them.
     pub fn new<const D: usize>(mesh: &Mesh<D>) -> Self {
-        let mut degenerate = vec![false; mesh.simplices.len()];
-        mesh.degenerate.iter().for_each(|&s| degenerate[s as usize] = true);
+        let mut left_out = vec![false; mesh.simplices.len()];
+        let copies = mesh.copies.iter().map(|(copy, _)| copy);
+        mesh.degenerate.iter().copied().chain(copies).for_each(|s| left_out[s as usize] = true);
         let corners = || {
             let identity = |v: u32| mesh.identity[v as usize] as usize;
             (mesh.simplices.iter().enumerate())
-                .filter(|(s, _)| !degenerate[*s])
+                .filter(|(s, _)| !left_out[*s])
                 .flat_map(move |(s, simplex)| simplex.map(|v| (identity(v), s as u32)))
         };
         let mut starts = vec![0u32; mesh.vertices.len() + 1];

@@ -7,6 +7,7 @@
 //! What the builder finds out about the surface, each in a file of its own:
 //! - [`identity`]: points with identical coordinates are one point, for intersection across all objects and for
 //!   normals within one;
+//! - [`copies`]: simplices that lie one on the other;
 //! - [`orientation`]: which components are closed, and which side of them is outside;
 //! - [`normals`]: measure-weighted vertex normals;
 //! - [`rounding`]: which simplices turn over when rounded;
@@ -15,6 +16,7 @@
 
 mod approach;
 mod build;
+pub mod copies;
 pub mod corners;
 mod error;
 pub mod facets;
@@ -37,6 +39,7 @@ use crate::geometry::{Aabb, Vector};
 
 pub use approach::approach;
 pub use build::MeshBuilder;
+pub use copies::Copies;
 pub use corners::Crease;
 pub use error::MeshError;
 pub use incidence::Incidence;
@@ -81,6 +84,8 @@ pub struct Mesh<const D: usize> {
     pub simplices: Vec<[u32; D]>,
     /// The simplices of measure zero, ascending. They are kept, but nothing hits them.
     pub degenerate: Vec<u32>,
+    /// The simplices of positive measure that lie on others. They are kept, but rays hit the first of each place.
+    pub copies: Copies,
     /// The simplices that rounding to `f32` turned over or made flat, ascending.
     pub turned_over: Vec<u32>,
     /// The objects, in order; their ranges cover all vertices and all simplices.
@@ -92,6 +97,12 @@ impl<const D: usize> Mesh<D> {
     #[inline]
     pub fn corners(&self, simplex: u32) -> [Vector<D>; D] {
         self.simplices[simplex as usize].map(|v| self.vertices[v as usize])
+    }
+
+    /// The corners of a simplex, as numbers that are the same only if the points are.
+    #[inline]
+    pub fn places_of(&self, simplex: u32) -> [u32; D] {
+        self.simplices[simplex as usize].map(|v| self.identity[v as usize])
     }
 
     /// The index of the object that a simplex belongs to.

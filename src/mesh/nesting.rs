@@ -61,7 +61,8 @@ pub fn depths<const D: usize>(corners: &[[Vector<D>; D]], components: &[&[u32]])
     (0..components.len()).into_par_iter().map(holders).collect()
 }
 
-fn direction<const D: usize>(k: u32) -> Vector<D> {
+/// One of some directions along no axis and no diagonal.
+pub(super) fn direction<const D: usize>(k: u32) -> Vector<D> {
     Vector::from_fn(|r, _| ((k * 37 + r as u32 * 101) % 64) as f32 - 31.37)
 }
 

@@ -7,11 +7,17 @@
 use std::ops::Range;
 
 use super::Mesh;
+use super::copies::Sides;
 use crate::geometry::{Vector64, narrow, normal_of, widen};
 
 /// Sets the normals of one object's vertices from its simplices. A vertex whose sum vanishes, as on a sheet folded
 /// flat, takes the normal of its first simplex; one without simplices keeps zero.
-pub fn set_vertex_normals<const D: usize>(mesh: &mut Mesh<D>, vertices: Range<usize>, simplices: Range<usize>) {
+pub(super) fn set_vertex_normals<const D: usize>(
+    mesh: &mut Mesh<D>,
+    vertices: Range<usize>,
+    simplices: Range<usize>,
+    sides: &Sides,
+) {
     let first = vertices.start;
     let mut slots = vec![usize::MAX; vertices.len()];
     // Identities may point into an earlier object; within this one the lowest vertex with that identity stands for it.
@@ -21,7 +27,8 @@ pub fn set_vertex_normals<const D: usize>(mesh: &mut Mesh<D>, vertices: Range<us
     }
     let mut sums = vec![Vector64::<D>::zeros(); vertices.len()];
     let mut fallback = vec![Vector64::<D>::zeros(); vertices.len()];
-    for simplex in &mesh.simplices[simplices] {
+    for s in simplices.filter(|&s| sides.leader(s as u32).is_none()) {
+        let simplex = &mesh.simplices[s];
         let normal = normal_of(&simplex.map(|v| widen(&mesh.vertices[v as usize])));
         for &v in simplex {
             let slot = slots[v as usize - first];

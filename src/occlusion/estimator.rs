@@ -131,6 +131,11 @@ fn spatial_order<const D: usize>(tracer: &Tracer<D>, points: &[ShadingPoint<D>],
             *first = place.min(*first);
         }
     }
+    for (copy, first) in mesh.copies.iter() {
+        let place = of_simplex[first as usize];
+        of_simplex[copy as usize] = place;
+        mesh.simplices[copy as usize].iter().for_each(|&v| of_vertex[v as usize] = place.min(of_vertex[v as usize]));
+    }
     let place = |i: usize| match points[i] {
         ShadingPoint::Vertex(vertex) => of_vertex[vertex as usize],
         ShadingPoint::Inside { simplex, .. } => of_simplex.get(simplex as usize).copied().unwrap_or(LAST),

@@ -7,6 +7,8 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
+use crate::io::Unfinished;
+
 /// The file's name in the output folder.
 const NAME: &str = ".ao4d-lock";
 
@@ -24,7 +26,7 @@ pub struct Busy {
 pub struct Lock {
     path: PathBuf,
     /// None where the folder can't be written to, so that nothing will be either.
-    file: Option<File>,
+    file: Option<(File, Vec<Unfinished>)>,
     /// Folders that were made for it, the innermost first.
     made: Vec<PathBuf>,
 }
@@ -63,7 +65,8 @@ impl Lock {
             if is_at(&file, &lock.path) {
                 let _ = file.set_len(0).and_then(|()| file.rewind());
                 let _ = writeln!(file, "{}", std::process::id());
-                lock.file = Some(file);
+                let own = lock.made.iter().chain([&lock.path]).cloned().map(Unfinished::new).collect();
+                lock.file = Some((file, own));
                 return Ok(lock);
             }
         }

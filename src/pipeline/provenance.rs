@@ -139,7 +139,7 @@ stages:
       objects:
         - {name: \"# it\", tesseract: {size: 0.5}, color: \"#00ff80\"}
         - {isosurface: {field: {tiger: {major: [0.55, 0.55], minor: 0.24}}, grid: {cells: 4}}}
-        - {hypersphere: {radius: 0.1}, crease_angle: off, transform: [{scale: [1, 2, 3, 4]}, {rotate: {plane: xw, degrees: 20}}]}
+        - {hypersphere: {radius: 0.1, subdivisions: 1}, crease_angle: off, transform: [{scale: [1, 2, 3, 4]}, {rotate: {plane: xw, degrees: 20}}]}
   - occlusion: {}
   - occlusion: {id: e, method: exact}
   - occlusion: {id: t, target_error: 0.01}

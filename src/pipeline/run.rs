@@ -175,34 +175,13 @@ impl Schedule<'_> {
         &mut self,
         scene: Ref<ScenePlan>,
         mesh: Mesh<D>,
-        mut notes: Vec<String>,
+        notes: Vec<String>,
         building: Duration,
     ) -> Result<(), RunError> {
         let plan = &self.pipeline.plan;
         let (vertices, simplices) = (mesh.vertices.len() as u64, mesh.simplices.len() as u64);
         let detail = format!("{} vertices, {} simplices", grouped(vertices), grouped(simplices));
         self.times.insert(scene.index(), (building, detail));
-        if let Some(&first) = mesh.degenerate.first() {
-            notes.push(format!(
-                "scene {}: {} of {} simplices have measure zero and are left out (the first is number {first}, of {})",
-                plan.id(scene),
-                mesh.degenerate.len(),
-                mesh.simplices.len(),
-                mesh.objects[mesh.object_of(first)].name
-            ));
-        }
-        if let Some(&first) = mesh.turned_over.first() {
-            let at: Vec<String> = mesh.corners(first)[0].iter().map(f32::to_string).collect();
-            notes.push(format!(
-                "scene {}: {} of {} simplices turned over or flat once rounded to single precision: they are thinner than \
-                 its steps there, and may shadow what is beside them (the first is number {first}, of {}, near ({}))",
-                plan.id(scene),
-                mesh.turned_over.len(),
-                mesh.simplices.len(),
-                mesh.objects[mesh.object_of(first)].name,
-                at.join(", ")
-            ));
-        }
         self.book.begin_scene(notes);
         let session = match &self.opencl {
             Some(opencl) => Session::on(mesh, Arc::clone(opencl)),

@@ -23,7 +23,7 @@ use crate::trace::{RayBackend, Sampling, ShadingPoint};
 const VOXELS: usize = 512;
 
 /// How far off a picture's occlusion is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accuracy {
     /// The root mean square of what voxels are off.
     pub rms: f64,

@@ -243,11 +243,13 @@ impl<const D: usize> Camera<D> {
         (widen(point) - self.eye).iter().map(|x| x.abs()).sum()
     }
 
-    /// What open surfaces face if they are to face the eye.
+    /// What surfaces face if they are to face the eye.
     pub fn viewpoint(&self) -> Viewpoint<D> {
         match self.projection {
             Projection::Perspective { .. } => Viewpoint::Eye(narrow(&self.eye)),
-            Projection::Parallel { .. } => Viewpoint::Direction(narrow(&self.back)),
+            Projection::Parallel { .. } => {
+                Viewpoint::Parallel { direction: narrow(&self.back), middle: narrow(&self.eye) }
+            }
         }
     }
 }

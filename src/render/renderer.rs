@@ -50,6 +50,8 @@ pub struct Slab {
     pub arrays: Vec<Array>,
     /// How many of their voxels see something.
     pub seen: u64,
+    /// How many of those see a surface from behind.
+    pub behind: u64,
 }
 
 impl<const D: usize> Renderer<D> {
@@ -117,7 +119,9 @@ impl<const D: usize> Renderer<D> {
                 audit.add(&buffer);
             }
             let arrays = aovs.iter().map(|aov| aov.array(&buffer)).collect();
-            sink(Slab { layers: buffer.layers(), arrays, seen })?;
+            let is_behind = |simplex: u32| simplex != NOTHING && visibility.is_away(simplex);
+            let behind = buffer.simplex.iter().filter(|&&simplex| is_behind(simplex)).count() as u64;
+            sink(Slab { layers: buffer.layers(), arrays, seen, behind })?;
         }
         Ok(audit.map(|audit| audit.finish(&*self.backend, progress)).transpose()?.flatten())
     }

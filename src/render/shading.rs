@@ -19,3 +19,10 @@ pub enum Shading {
     /// interpolated value is denoised.
     Auto(Arc<Estimates>, Estimator),
 }
+
+impl Shading {
+    /// Whether it shows values at vertices, which are those of one side of the surface.
+    pub fn is_interpolated(&self) -> bool {
+        matches!(self, Self::Flat(_) | Self::Smooth(_) | Self::Auto(..))
+    }
+}

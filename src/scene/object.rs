@@ -83,7 +83,8 @@ pub struct ObjectSpec {
     /// The colour; a light grey of 0.8 if left out.
     #[serde(default)]
     pub color: Color,
-    /// Which way an open surface faces.
+    /// Which way the surface faces: `input` (default), open surfaces by the order of their vertices, closed ones outwards; or
+    /// `eye`, where it is seen from by the first render of the scene, so that a closed surface around the eye is a room.
     #[serde(default)]
     pub orientation: Orientation,
     /// Where the surface creases: neighbours whose normals differ by more than this, in degrees, have a shading point each
@@ -111,14 +112,14 @@ pub enum Off {
     Off,
 }
 
-/// Which way an open surface faces.
+/// Which way a surface faces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Orientation {
-    /// As the order of its vertices says.
+    /// As the order of its vertices says if it is open, outwards if it is closed.
     #[default]
     Input,
-    /// Towards the eye.
+    /// Towards the eye, from within too.
     Eye,
 }
 
@@ -181,10 +182,11 @@ impl Shape<'_> {
 
     /// The files it is read from, those among them that only a header names; paths are relative to `folder`.
     pub fn input_files(&self, folder: &Path) -> Vec<PathBuf> {
+        let of_mesh = |file: PathBuf| [crate::io::mesh::data_files(&file), vec![file]].concat();
         match self {
-            Shape::File(path) => vec![folder.join(path)],
-            Shape::Extrude(spec) => vec![folder.join(&spec.mesh)],
-            Shape::Spin(spec) => vec![folder.join(&spec.mesh)],
+            Shape::File(path) => of_mesh(folder.join(path)),
+            Shape::Extrude(spec) => of_mesh(folder.join(&spec.mesh)),
+            Shape::Spin(spec) => of_mesh(folder.join(&spec.mesh)),
             Shape::Isosurface(spec) => spec.input_files(folder),
             _ => Vec::new(),
         }

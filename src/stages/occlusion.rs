@@ -288,6 +288,7 @@ impl Stage for OcclusionPlan {
         };
         let sidecar = Sidecar { pipeline: Some(run.told.to_owned()), ..sidecar };
         // The values last: they are what others look for.
+        let _together = io::together();
         match plan[me].errors_file() {
             Some(errors) => {
                 let bytes = write_whole(&plan.out.join(&errors), &occlusion::encode(&found.errors))?;

@@ -348,19 +348,32 @@ impl Stage for RenderPlan {
         let hash = scene.session.mesh_hash();
         let mut files = PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), &picture.grid, hash)?;
         let aovs = files.aovs().to_vec();
-        let mut seen = 0;
+        let (mut seen, mut behind) = (0, 0);
         // Two passes over the voxels: what is seen, and its shade.
         let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
         let accuracy = picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;
+            behind += slab.behind;
             Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
         })?;
         running.end();
+        if let Some(accuracy) = &accuracy {
+            files.tell(accuracy);
+        }
         let rendering = start.elapsed();
         let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
         let mut notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
         if let Some(lighting) = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit())) {
             notes.extend(lighting::in_vain(lighting, plan.id(me)));
+        }
+        if behind > 0 && picture.shading.is_interpolated() {
+            notes.push(format!(
+                "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
+                 turn that object by `orientation: eye`, or take `shading: voxel`",
+                plan.id(me),
+                grouped(behind),
+                grouped(seen)
+            ));
         }
         for (file, bytes) in files.finish()? {
             run.made(&file, bytes, notes.clone())?;

@@ -32,7 +32,7 @@ pub struct SceneSpec {
     /// 4 (default), or 3 for triangles in ordinary space.
     #[schemars(range(min = 3, max = 4))]
     pub dimension: Option<u64>,
-    /// The objects. Those that come first win where two are hit at the same distance.
+    /// The objects. Where two are hit at the same distance, one that faces the eye wins, else the first.
     pub objects: Vec<ObjectSpec>,
 }
 
@@ -201,5 +201,33 @@ pub fn build<const D: usize>(
         let crease = object.crease().map_err(blame)?;
         builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
     }
-    builder.finish_watched(progress).ok_or_else(|| Invalid::new(path, "stopped"))
+    let mesh = builder.finish_watched(progress).ok_or_else(|| Invalid::new(path, "stopped"))?;
+    notes.extend(worth_telling(&mesh).into_iter().map(|note| format!("scene {id}: {note}")));
+    Ok(mesh)
+}
+
+/// Simplices that nothing hits, that rounding turned over, or that lie on others.
+fn worth_telling<const D: usize>(mesh: &Mesh<D>) -> Vec<String> {
+    let total = mesh.simplices.len();
+    let mut told = Vec::new();
+    let mut tell = |count: usize, first: u32, what: &str, near: bool| {
+        let name = &mesh.objects[mesh.object_of(first)].name;
+        let at: Vec<String> = mesh.corners(first)[0].iter().map(f32::to_string).collect();
+        let near = if near { format!(", near ({})", at.join(", ")) } else { String::new() };
+        told.push(format!("{count} of {total} simplices {what} (the first is number {first}, of {name}{near})"));
+    };
+    if let Some(&first) = mesh.degenerate.first() {
+        tell(mesh.degenerate.len(), first, "have measure zero and are left out", false);
+    }
+    if let Some(&first) = mesh.turned_over.first() {
+        let what = "turned over or flat once rounded to single precision: they are thinner than its steps there, and may \
+                    shadow what is beside them";
+        tell(mesh.turned_over.len(), first, what, true);
+    }
+    if let Some((first, _)) = mesh.copies.iter().next() {
+        let what = "lie on others with the same corners: those that face the same way count once, and of two that face \
+                    opposite ways each is seen from its own side";
+        tell(mesh.copies.len(), first, what, false);
+    }
+    told
 }

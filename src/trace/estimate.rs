@@ -57,7 +57,7 @@ impl Target {
     /// Whether the rays so far are enough.
     pub(crate) fn is_met(&self, accumulator: &Accumulator) -> bool {
         let rays = accumulator.rays();
-        rays >= Self::FEWEST && rays.is_power_of_two() && accumulator.error() <= f64::from(self.error)
+        rays >= Self::FEWEST && rays.is_power_of_two() && accumulator.cautious_error() <= f64::from(self.error)
     }
 }
 
@@ -140,6 +140,16 @@ impl Accumulator {
         variance.sqrt().min(1.0)
     }
 
+    /// A standard error to stop by. Whoever stops as soon as an error is small enough stops at the luckiest, so groups count
+    /// as if they were independent, and agreement as of independent rays.
+    pub fn cautious_error(&self) -> f64 {
+        let variance = match self.even_in {
+            None => self.variance_of_rays(),
+            Some(_) => self.variance_of_groups(),
+        };
+        variance.sqrt().max(bound(self.rays())).min(1.0)
+    }
+
     /// How many groups there are, the unfinished one in part.
     fn groups(&self) -> f64 {
         f64::from(self.rays()) / f64::from(self.size)
@@ -170,7 +180,7 @@ impl Accumulator {
     }
 }
 
-/// What no estimate of so many independent rays is below.
+/// What no estimate of so many independent rays is below: the rule of three.
 fn bound(rays: u32) -> f64 {
     1.5 / f64::from(rays)
 }

@@ -1,5 +1,6 @@
 //! Where ambient occlusion is asked for: at a vertex of the mesh, or at a point inside one of its simplices.
 
+use crate::accel::Tracer;
 use crate::geometry::Vector;
 use crate::mesh::Mesh;
 
@@ -8,7 +9,8 @@ use crate::mesh::Mesh;
 pub enum ShadingPoint<const D: usize> {
     /// A vertex of the mesh, with its normal. The simplices around it hide what lies behind them ([`super::Surroundings`]).
     Vertex(u32),
-    /// A visible point inside a simplex, on the side that the normal points to. That simplex hides nothing.
+    /// A visible point inside a simplex, on the side that the normal points to. That simplex hides nothing, and neither
+    /// does another that lies in the same hyperplane there.
     Inside {
         /// Where it is.
         position: Vector<D>,
@@ -45,12 +47,12 @@ impl<const D: usize> ShadingPoint<D> {
         }
     }
 
-    /// The simplex that hides nothing, if any.
+    /// The simplices that hide nothing: what is underfoot of a point inside one, else none.
     #[inline]
-    pub fn ignored(&self) -> Option<u32> {
+    pub fn ignored(&self, tracer: &Tracer<D>) -> Vec<u32> {
         match self {
-            Self::Vertex(_) => None,
-            Self::Inside { simplex, .. } => Some(*simplex),
+            Self::Vertex(_) => Vec::new(),
+            Self::Inside { simplex, position, .. } => tracer.underfoot(*simplex, position),
         }
     }
 

@@ -52,8 +52,8 @@ pub struct Surroundings<const D: usize> {
     pub normal: Vector<D>,
     /// What the vertex star hides.
     star: Vec<Cone<D>>,
-    /// The simplex this point is inside of.
-    ignored: Option<u32>,
+    /// The simplices this point is inside of.
+    ignored: Vec<u32>,
 }
 
 impl<const D: usize> Surroundings<D> {
@@ -64,7 +64,7 @@ impl<const D: usize> Surroundings<D> {
             position: point.position(mesh),
             normal: point.normal(mesh),
             star: star_cones(tracer, point),
-            ignored: point.ignored(),
+            ignored: point.ignored(tracer),
         }
     }
 
@@ -83,6 +83,6 @@ impl<const D: usize> Surroundings<D> {
     #[inline]
     pub fn is_visible(&self, tracer: &Tracer<D>, direction: Vector<D>, limit: f32) -> bool {
         let ray = Ray::new(self.position, direction);
-        !self.hides(&ray) && !tracer.occluded(&ray, limit, self.ignored)
+        !self.hides(&ray) && !tracer.occluded_by_others(&ray, limit, &self.ignored)
     }
 }

@@ -47,6 +47,11 @@ macro_rules! numbers {
                 }
             }
 
+            /// So many zeros of this type.
+            pub fn zeros(self, count: usize) -> Values {
+                match self { $(Kind::$kind => Values::$kind(vec![Default::default(); count])),+ }
+            }
+
             /// The numbers in words of text; the first word that is no such number otherwise.
             pub fn parse<'a>(self, words: impl Iterator<Item = &'a str>) -> Result<Values, &'a str> {
                 match self {
@@ -77,6 +82,24 @@ macro_rules! numbers {
             /// All numbers in double precision.
             pub fn to_f64(&self) -> Vec<f64> {
                 match self { $(Values::$kind(v) => v.iter().map(|&x| x as f64).collect()),+ }
+            }
+
+            /// Puts `count` numbers, those of `from` from number `start` on, in place of those from number `at` on. Whether that
+            /// can be: not if the types differ, or if one of the two has fewer numbers.
+            #[must_use]
+            pub fn place(&mut self, at: usize, from: &Values, start: usize, count: usize) -> bool {
+                match (self, from) {
+                    $((Values::$kind(to), Values::$kind(from)) => {
+                        let places = at.checked_add(count).and_then(|end| to.get_mut(at..end));
+                        let numbers = start.checked_add(count).and_then(|end| from.get(start..end));
+                        match (places, numbers) {
+                            (Some(places), Some(numbers)) => places.copy_from_slice(numbers),
+                            _ => return false,
+                        }
+                        true
+                    })+
+                    _ => false,
+                }
             }
 
             /// Appends the numbers from `range` as little-endian bytes.
@@ -167,6 +190,11 @@ impl Array {
     /// An array of tuples of `components` numbers.
     pub fn new(name: impl Into<String>, components: usize, values: impl Into<Values>) -> Self {
         Self { name: name.into(), components, values: values.into() }
+    }
+
+    /// The same without its numbers.
+    pub fn clone_head(&self) -> Self {
+        Self { name: self.name.clone(), components: self.components, values: self.values.kind().zeros(0) }
     }
 
     /// The number of tuples.

@@ -54,3 +54,54 @@ fn interrupted_runs_leave_nothing_behind() {
         }
     }
 }
+
+/// Whatever a command does, it ends within a second, be it work that doesn't listen: reading, sorting, building.
+#[test]
+fn no_work_is_too_deep_in_thought() {
+    let folder = Folder::new();
+    // A soup of triangles, which takes long to make out, and numbers that take long to go through.
+    let count = 600_000u32;
+    let mut random = 1u32;
+    let mut stl = vec![0; 80];
+    stl.extend(count.to_le_bytes());
+    for _ in 0..count {
+        stl.extend([0; 12]);
+        for _ in 0..9 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            stl.extend(((random >> 8) as f32).to_le_bytes());
+        }
+        stl.extend([0; 2]);
+    }
+    std::fs::write(folder.path("soup.stl"), stl).unwrap();
+    std::fs::File::create(folder.path("zeros.raw")).unwrap().set_len(6_000_000_000).unwrap();
+    let grid = "isosurface: {field: {formula: \"sin(40*x)*sin(40*y)*sin(40*z)\"}, grid: {min: [-1,-1,-1], max: [1,1,1], cells: 400}}";
+    for (name, shape) in [("file", "file: soup.stl"), ("grid", grid)] {
+        let text = format!(
+            "name: {name}\nstages:\n  - scene: {{dimension: 3, objects: [{{{shape}}}]}}\n  - occlusion: {{samples: 4}}\n  \
+             - render: {{dimensions: [4, 4]}}\n  - write: {{vti: a.vti}}\n"
+        );
+        std::fs::write(folder.path(&format!("{name}.yaml")), text).unwrap();
+    }
+    for arguments in [
+        &["run", "file.yaml"][..],
+        &["run", "grid.yaml", "file.yaml"],
+        &["check", "grid.yaml"],
+        &["study", "file.yaml"],
+        &["info", "soup.stl"],
+        &["info", "zeros.raw"],
+        &["compare", "zeros.raw", "zeros.raw"],
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ao4d"));
+        command.current_dir(folder.0.path()).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(child.try_wait().unwrap().is_none(), "{arguments:?}: ended too early to be interrupted");
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        let sent = Instant::now();
+        assert_eq!(wait(&mut child, Duration::from_secs(60)), Some(130), "{arguments:?}");
+        // Beside other tests the machine may be busy.
+        assert!(sent.elapsed() < Duration::from_secs(3), "{arguments:?}: {:?}", sent.elapsed());
+        assert_eq!(child.wait_with_output().unwrap().stderr, b"interrupted\n", "{arguments:?}");
+        assert!(!folder.path("out").exists() || names(&folder.path("out")).is_empty(), "{arguments:?}");
+    }
+}

@@ -96,3 +96,29 @@ fn a_disk_that_fills_up() {
     assert!(whole[0] < FILES.len() && whole.last() == Some(&FILES.len()), "{whole:?}");
     assert!(whole.windows(2).all(|pair| pair[0] <= pair[1]), "{whole:?}");
 }
+
+/// A quarter of a gigabyte of memory, and files that are larger: told of block by block, or refused with what they need.
+#[cfg(target_os = "linux")]
+#[test]
+fn files_larger_than_the_memory() {
+    let folder = Folder::new();
+    for name in ["a.raw", "b.f32", "c.stl", "d.vti", "e.ply"] {
+        // Zeros that take no room on the disk.
+        std::fs::File::create(folder.path(name)).unwrap().set_len(300_000_000).unwrap();
+    }
+    let ao4d = |arguments: &str| {
+        let script = format!("ulimit -v 262144; exec '{}' {arguments}", env!("CARGO_BIN_EXE_ao4d"));
+        let output = Command::new("sh").args(["-c", &script]).current_dir(folder.0.path()).output().unwrap();
+        let told = String::from_utf8(output.stdout).unwrap() + &String::from_utf8(output.stderr).unwrap();
+        (output.status.code(), told)
+    };
+    let (code, told) = ao4d("info a.raw");
+    assert!(code == Some(0) && told.contains("25000000") && told.contains("0 to 0, mean 0"), "{told}");
+    let (code, told) = ao4d("compare b.f32 b.f32");
+    assert!(code == Some(0) && told.contains("75000000 numbers, all equal"), "{told}");
+    for arguments in ["info c.stl", "info d.vti", "info e.ply", "compare c.stl c.stl"] {
+        let (code, told) = ao4d(arguments);
+        assert_eq!(code, Some(2), "{arguments}: {told}");
+        assert!(told.contains("needs about 900000000 bytes of memory, and "), "{arguments}: {told}");
+    }
+}

@@ -31,7 +31,7 @@ stages:
   - occlusion: {id: ao, samples: 8, file: ao.f32}
   - render: {id: plain, occlusion: none, dimensions: [7, 6, 5]}
   - write: {vti: plain.vti}
-  - render: {id: image, dimensions: [7, 6, 5]}
+  - render: {id: image, dimensions: [7, 6, 5], shading: smooth}
   - write: {id: files, vti: image.vti, raw: image.raw, vtu: scene.vtu, png: slices.png}
   - paraview: {state: figure.py, screenshot: figure.png}
 ";

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use ao4d::geometry::Dimension;
 use ao4d::pipeline::Pipeline;
 use ao4d::stages::occlusion::{OcclusionPlan, OcclusionSource, Samples};
 use ao4d::stages::render::RenderPlan;
@@ -30,11 +31,12 @@ pub fn smaller(path: &Path) -> Vec<String> {
     let plan = Pipeline::load(path, &[], None).unwrap().plan;
     let mut overrides = Vec::new();
     for (stage, render) in plan.all::<RenderPlan>() {
-        let [_, _, z] = render.dimensions;
-        let most = if z == 1 { 120 } else { 36 };
+        let flat = plan[render.scene].dimension == Dimension::Three;
+        let most = if flat { 120 } else { 36 };
         let longest = render.dimensions.into_iter().fold(most, usize::max);
-        let [x, y, z] = render.dimensions.map(|d| (d * most / longest).max(1));
-        let dimensions = if z == 1 { format!("[{x}, {y}]") } else { format!("[{x}, {y}, {z}]") };
+        // No axis is lost: an image of two layers keeps both.
+        let [x, y, z] = render.dimensions.map(|d| (d * most / longest).max(d.min(2)));
+        let dimensions = if flat { format!("[{x}, {y}]") } else { format!("[{x}, {y}, {z}]") };
         overrides.push(format!("{}.dimensions={dimensions}", plan.path(stage)));
     }
     for (stage, occlusion) in plan.all::<OcclusionPlan>() {

@@ -1,5 +1,5 @@
-//! Grids of values from files: `.vti`, `.raw`, `.nii` and `.nii.gz`, `.tif`, `.nc`, `.nrrd`; single files, and sequences with
-//! a file for each step of time.
+//! Grids of values from files: `.vti`, `.pvti` and `.vtk`, `.raw`, `.nii` and `.nii.gz`, `.tif`, `.nc`, `.nrrd`; single files, and
+//! sequences with a file for each step of time, named one by one or by a list (`.pvd`, `.series`).
 //!
 //! Whatever the format, a reader opens a file to [`Opened`]: its axes as they are stored, each with what it is, where its points
 //! are and which way it runs, and a stream of [`Numbers`]. [`Opened::arrange`] makes an [`Image`] of it: x, y, z and time, in
@@ -9,8 +9,8 @@
 //! What a format says and this module doesn't heed is told in notes; what can't be read is refused, with what would help.
 
 mod axes;
+mod list;
 mod netcdf;
-mod netcdf_header;
 mod nifti;
 mod nrrd;
 mod numbers;
@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 pub use self::axes::{Axis, Frame, Image, Opened, Placement, Positions, Role};
 pub use self::numbers::Numbers;
 use self::numbers::Packing;
-use super::{Input, InputError as Error};
+use super::{Input, InputError as Error, series};
 use crate::volume::{Kind, available_memory};
 
 /// The type of the numbers in a raw file.
@@ -118,13 +118,37 @@ pub fn data_files(path: &Path) -> Vec<PathBuf> {
     match format(path) {
         Some(Format::Nrrd) => nrrd::data_files(path),
         Some(Format::Nifti) => nifti::data_files(path),
+        Some(Format::Pieces) => super::vtk::piece_files(path),
+        Some(Format::List) => listed_files(path),
         _ => Vec::new(),
     }
 }
 
-/// Whether a file is an image by its name.
-pub fn is_image(path: &Path) -> bool {
-    format(path).is_some()
+/// The files that a list names, and those that they name.
+fn listed_files(path: &Path) -> Vec<PathBuf> {
+    let files = series::files(path).into_iter().filter(|file| !series::is_list(file));
+    files.flat_map(|file| [data_files(&file), vec![file]].concat()).collect()
+}
+
+/// Whether the files of a list are images, by the name of the first; a `.vtk` can be either, and is looked into.
+fn list_is_of_images(path: &Path) -> bool {
+    let Some(first) = series::files(path).into_iter().next() else { return false };
+    match first.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
+        "vtk" => {
+            matches!(super::vtk::read_wanted(&first, super::vtk::Wanted::Named(&[])), Ok(super::vtk::DataSet::Image(_)))
+        }
+        ending => !super::mesh::ENDINGS.contains(&ending),
+    }
+}
+
+/// Whether `info` tells of a file as an image of measurements, with time among its axes. Images of VTK and files without a header,
+/// which hold whatever this program writes, are told of otherwise.
+pub fn is_measurement(path: &Path) -> bool {
+    match format(path) {
+        None | Some(Format::Vti | Format::Pieces | Format::Raw) => false,
+        Some(Format::List) => list_is_of_images(path),
+        Some(Format::Nifti | Format::Tiff | Format::Netcdf | Format::Nrrd) => true,
+    }
 }
 
 /// Opens a file as it is stored.
@@ -144,6 +168,10 @@ enum Format {
     Tiff,
     Netcdf,
     Nrrd,
+    /// Files of VTK that make one image.
+    Pieces,
+    /// Files over time.
+    List,
 }
 
 /// The format of a file, by its name.
@@ -151,11 +179,13 @@ fn format(path: &Path) -> Option<Format> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let ends = |endings: &[&str]| endings.iter().any(|ending| name.ends_with(ending));
     Some(match () {
-        () if ends(&[".vti"]) => Format::Vti,
+        () if ends(&[".vti", ".vtk"]) => Format::Vti,
+        () if ends(&[".pvti"]) => Format::Pieces,
+        () if ends(&[".pvd", ".series"]) => Format::List,
         () if ends(&[".raw", ".bin", ".dat"]) => Format::Raw,
         () if ends(&[".nii", ".nii.gz", ".hdr", ".hdr.gz"]) => Format::Nifti,
         () if ends(&[".tif", ".tiff"]) => Format::Tiff,
-        () if ends(&[".nc", ".cdf", ".nc4", ".cdf5"]) => Format::Netcdf,
+        () if ends(&[".nc", ".cdf", ".nc4", ".cdf5", ".h5", ".hdf5", ".he5"]) => Format::Netcdf,
         () if ends(&[".nrrd", ".nhdr"]) => Format::Nrrd,
         () => return None,
     })
@@ -167,14 +197,15 @@ fn stored(input: &Input, request: &Request) -> Result<Opened, Error> {
         return Err(input.wrong("is empty"));
     }
     let open: fn(&Path, u64, &Request) -> Result<Opened, String> = match format(&input.path) {
-        Some(Format::Vti) => vti::open,
+        Some(Format::Vti | Format::Pieces) => vti::open,
+        Some(Format::List) => list::open,
         Some(Format::Raw) => raw::open,
         Some(Format::Nifti) => nifti::open,
         Some(Format::Tiff) => tiff::open,
         Some(Format::Netcdf) => netcdf::open,
         Some(Format::Nrrd) => nrrd::open,
         None => {
-            let known = ".vti, .raw, .nii, .nii.gz, .tif, .nc, .nrrd";
+            let known = ".vti, .pvti, .vtk, .pvd, .vti.series, .raw, .nii, .nii.gz, .tif, .nc, .nrrd";
             return Err(input.wrong(format!("can't tell what it holds; the name must end in one of {known}")));
         }
     };

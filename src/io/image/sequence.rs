@@ -45,10 +45,10 @@ pub(super) fn open(inputs: Vec<Input>, request: &Request) -> Result<Image, Error
     image.axes[3].size = count;
     image.has_times = have_times;
     let each = image.points()[..3].iter().product::<usize>() as u64 * frames as u64;
-    let mut rest = inputs.into_iter();
-    let current = rest.next();
-    let now = std::mem::replace(&mut image.values, Box::new(super::numbers::Held::new(Vec::new())));
-    image.values = Box::new(Sequence { rest, request: request.clone(), each, current, now, left: each });
+    let first = std::mem::replace(&mut image.values, Box::new(super::numbers::Held::new(Vec::new())));
+    let request = request.clone();
+    let reopen = move |input: &Input| arranged(input, &request).map(|image| image.values).map_err(|e| e.to_string());
+    image.values = Box::new(Sequence::new(inputs, each, first, Box::new(reopen)));
     Ok(image)
 }
 
@@ -87,10 +87,13 @@ fn agree(first: &Image, other: &Image) -> Result<(), String> {
     }
 }
 
+/// What opens a file again when its turn comes.
+type Reopen = Box<dyn Fn(&Input) -> Result<Box<dyn Numbers>, String>>;
+
 /// Files one after the other.
-struct Sequence {
+pub(super) struct Sequence {
     rest: std::vec::IntoIter<Input>,
-    request: Request,
+    reopen: Reopen,
     /// Values of each.
     each: u64,
     current: Option<Input>,
@@ -100,12 +103,19 @@ struct Sequence {
 }
 
 impl Sequence {
+    /// Of these files with so many values each; the first is opened already.
+    pub fn new(inputs: Vec<Input>, each: u64, first: Box<dyn Numbers>, reopen: Reopen) -> Self {
+        let mut rest = inputs.into_iter();
+        let current = rest.next();
+        Self { rest, reopen, each, current, now: first, left: each }
+    }
+
     /// Makes sure that something is left of the current file.
     fn go_on(&mut self) -> Result<(), String> {
         if self.left == 0 {
             let input = self.rest.next().ok_or("has no more values")?;
-            let image = arranged(&input, &self.request).map_err(|error| error.to_string())?;
-            (self.now, self.left, self.current) = (image.values, self.each, Some(input));
+            (self.now, self.left) = ((self.reopen)(&input)?, self.each);
+            self.current = Some(input);
         }
         Ok(())
     }

@@ -1,11 +1,11 @@
-//! `.vti`, VTK's images: one array of numbers, on the points or in the cells, and `TimeValue` from the field data.
+//! `.vti`, `.pvti` and legacy `.vtk`, VTK's images: one array of numbers, on the points or in the cells, and `TimeValue` from the field data.
 
 use std::path::Path;
 
 use super::axes::{Axis, Opened, Positions, Role};
 use super::numbers::Held;
 use super::{Request, room_for};
-use crate::io::vtk::{self, DataSet, Field};
+use crate::io::vtk::{self, DataSet};
 use crate::volume::Array;
 
 /// Arrays that VTK adds of its own accord, to say which points count.
@@ -45,12 +45,9 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
     if array.components > 1 {
         axes.insert(0, Axis::new(&array.name, Some(Role::Channel), array.components));
     }
-    let time = image.field_data.iter().find_map(|field| match field {
-        Field::Numbers(array) if array.name == "TimeValue" && !array.values.is_empty() => Some(array.values.get(0)),
-        _ => None,
-    });
+    let time = image.time();
     let mut axis = Axis::new("time", Some(Role::Time), 1);
-    if let Some(time) = time.filter(|time| time.is_finite()) {
+    if let Some(time) = time {
         axis.positions = Positions::Listed(vec![time]);
     }
     axes.push(axis);

@@ -1,5 +1,5 @@
 //! Meshes from files: triangles from `.stl`, `.obj` and `.ply`, triangles or tetrahedra from `.vtu`, `.vtp`, `.vtk` and
-//! `.msh`.
+//! `.msh`; from several files in one list (`.pvtu`, `.pvtp`), and from lists over time (`.pvd`, `.vtu.series`) of one step.
 //!
 //! Each format has a reader that takes the cells as the file has them, as VTK's model of a mesh ([`UnstructuredGrid`]): what
 //! `info` tells and `compare` compares. `simplices` makes of that what a scene takes: polygons become triangles, solid cells
@@ -17,17 +17,34 @@ mod polygon;
 mod simplices;
 mod stl;
 
-use super::vtk::{DataSet, UnstructuredGrid, Wanted, parse_wanted};
-use super::{Input, InputError};
+use std::path::{Path, PathBuf};
+
+use super::vtk::{self, DataSet, UnstructuredGrid, Wanted};
+use super::{Input, InputError, series};
 use crate::geometry::Vector64;
 
 pub use simplices::simplices;
 
 /// The endings of the names of mesh files.
-pub const ENDINGS: [&str; 7] = ["stl", "obj", "ply", "msh", "vtk", "vtp", "vtu"];
+pub const ENDINGS: [&str; 11] = ["stl", "obj", "ply", "msh", "vtk", "vtp", "vtu", "pvtp", "pvtu", "pvd", "series"];
 
 /// The arrays that a scene looks for.
 const ARRAYS: [&str; 2] = ["position", "normal"];
+
+/// The arrays in which VTK marks cells that belong to a neighbouring piece.
+const GHOSTS: [&str; 2] = ["vtkGhostType", "vtkGhostLevels"];
+
+/// The files that are read besides this one: those that it names.
+pub fn data_files(path: &Path) -> Vec<PathBuf> {
+    if series::is_list(path) {
+        let files = series::files(path).into_iter().filter(|file| !series::is_list(file));
+        return files.flat_map(|file| [data_files(&file), vec![file]].concat()).collect();
+    }
+    match path.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
+        "pvtp" | "pvtu" => vtk::piece_files(path),
+        _ => Vec::new(),
+    }
+}
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,7 +101,8 @@ impl FileMesh {
 impl Input {
     /// Reads the mesh as simplices, by the ending of the file's name.
     pub fn read(&self) -> Result<FileMesh, InputError> {
-        let mut mesh = simplices(&self.read_cells(Wanted::Named(&ARRAYS))?).map_err(|message| self.wrong(message))?;
+        let mut mesh = simplices(&self.read_cells(Wanted::Named(&[ARRAYS, GHOSTS].concat()))?)
+            .map_err(|message| self.wrong(message))?;
         if self.ending() == "msh" {
             // Gmsh writes the curves of its geometry beside every mesh.
             mesh.notes.clear();
@@ -101,25 +119,50 @@ impl Input {
     pub fn read_cells(&self, wanted: Wanted<'_>) -> Result<UnstructuredGrid, InputError> {
         let ending = self.ending();
         if !ENDINGS.contains(&ending.as_str()) {
-            let known = "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp or .vtu";
+            let known = "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or .series";
             return Err(self.wrong(format!("can't tell what it holds; {known}")));
         }
         let bytes = crate::input::read(&self.path).map_err(|source| self.unreadable(source))?;
         if bytes.is_empty() {
             return Err(self.wrong("is empty"));
         }
+        if series::is_list(&self.path) {
+            return self.read_list(wanted);
+        }
         let grid = match ending.as_str() {
             "stl" => stl::read(&bytes),
             "ply" => ply::read(&bytes),
             "obj" => obj::read(&bytes),
             "msh" => msh::read(&bytes),
-            _ => match parse_wanted(&bytes, wanted) {
+            _ => match vtk::parse_at(&bytes, wanted, Some(&self.path)) {
                 Ok(DataSet::Unstructured(grid)) => Ok(grid),
                 Ok(DataSet::Image(_)) => Err("holds an image, where a mesh was expected".into()),
                 Err(problem) => Err(problem.to_string()),
             },
         };
         grid.map_err(|message| self.wrong(message))
+    }
+
+    /// Reads the files of a list over time, which are the parts of one mesh.
+    fn read_list(&self, wanted: Wanted<'_>) -> Result<UnstructuredGrid, InputError> {
+        let steps = series::read(&self.path).map_err(|message| self.wrong(message))?;
+        if let [first, .., last] = steps.as_slice() {
+            let (count, file) = (steps.len(), first.files[0].display());
+            let times = [first, last].map(|step| step.time.map_or("no time".to_owned(), |time| time.to_string()));
+            return Err(self.wrong(format!(
+                "holds {count} meshes, at the times {} to {}; name the file of one of them, as {file}",
+                times[0], times[1]
+            )));
+        }
+        let mut parts = Vec::new();
+        for file in steps.iter().flat_map(|step| &step.files) {
+            let part = Self { key: self.key.clone(), path: file.clone() };
+            if series::is_list(file) {
+                return Err(self.wrong(format!("names another list, {}; name that one", file.display())));
+            }
+            parts.push(part.read_cells(wanted)?);
+        }
+        vtk::joined(parts).map_err(|problem| self.wrong(problem.to_string()))
     }
 }
 

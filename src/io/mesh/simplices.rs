@@ -8,15 +8,23 @@
 //! neighbours agree (Dompierre, Labbé, Vallet and Camarero 1999).
 
 use super::polygon;
-use super::{ARRAYS, Cells, FileMesh, PointArray};
+use super::{ARRAYS, Cells, FileMesh, GHOSTS, PointArray};
 use crate::io::vtk::UnstructuredGrid;
 use crate::io::vtk::cell::{self, POLYGON, QUAD, STRIP, TETRAHEDRON, TRIANGLE, cell_name, dimension};
+use crate::volume::Array;
+
+/// A cell that belongs to another piece, in `vtkGhostType`.
+const DUPLICATE: i128 = 1;
+/// A cell that isn't to be seen.
+const HIDDEN: i128 = 32;
 
 /// The mesh's simplices.
 ///
 /// # Errors
 /// If a cell that counts is of a kind that can't be divided.
 pub fn simplices(grid: &UnstructuredGrid) -> Result<FileMesh, String> {
+    let own = without_ghosts(grid);
+    let grid = own.as_ref().unwrap_or(grid);
     let highest = grid.types.iter().map(|&kind| dimension(kind)).max().unwrap_or(0);
     let cells = match highest {
         3 => Cells::Tetrahedra(tetrahedra(grid)?),
@@ -34,6 +42,27 @@ pub fn simplices(grid: &UnstructuredGrid) -> Result<FileMesh, String> {
         .map(|a| PointArray { values: a.values.to_f64(), name: a.name.clone(), components: a.components })
         .collect();
     Ok(FileMesh { points, cells, point_arrays, notes })
+}
+
+/// The mesh without the cells that stand for those of a neighbouring piece, or are to be hidden; none if all of them count.
+fn without_ghosts(grid: &UnstructuredGrid) -> Option<UnstructuredGrid> {
+    // Of the older array every level but 0 is a copy; of the newer one two bits count.
+    let ghost = |array: &Array, i: usize| match array.name.as_str() {
+        "vtkGhostType" => array.values.integer(i).is_some_and(|bits| bits & (DUPLICATE | HIDDEN) != 0),
+        name => GHOSTS.contains(&name) && array.values.get(i) != 0.0,
+    };
+    let marks: Vec<&Array> = grid.cell_arrays.iter().filter(|a| a.values.len() == grid.types.len()).collect();
+    let ghosts: Vec<bool> = (0..grid.types.len()).map(|i| marks.iter().any(|array| ghost(array, i))).collect();
+    if !ghosts.contains(&true) {
+        return None;
+    }
+    let mut own = UnstructuredGrid {
+        points: grid.points.clone(),
+        point_arrays: grid.point_arrays.clone(),
+        ..UnstructuredGrid::default()
+    };
+    grid.cells().zip(ghosts).filter(|(_, ghost)| !ghost).for_each(|((kind, points), _)| own.push(kind, points));
+    Some(own)
 }
 
 fn triangles(grid: &UnstructuredGrid) -> Result<Vec<[u32; 3]>, String> {
@@ -184,6 +213,21 @@ mod tests {
         // The border of 9 squares a side, two triangles each, and nothing open or crowded within.
         let pairs = facet_pairs(&tetrahedra);
         assert_eq!((pairs.open, pairs.crowded, pairs.misoriented), (6 * 9 * 2, 0, 0));
+    }
+
+    #[test]
+    fn cells_of_a_neighbouring_piece_do_not_count() {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]];
+        let mut grid = UnstructuredGrid { points: points.to_vec(), ..Default::default() };
+        [[0, 1, 2, 3], [1, 2, 3, 4], [0, 1, 2, 4]].iter().for_each(|cell| grid.push(TETRAHEDRON, cell));
+        let kept = |name: &str, marks: [u8; 3]| {
+            let marked = UnstructuredGrid { cell_arrays: vec![Array::new(name, 1, marks.to_vec())], ..grid.clone() };
+            let Cells::Tetrahedra(tetrahedra) = simplices(&marked).unwrap().cells else { panic!("no solid") };
+            tetrahedra.len()
+        };
+        // Copies and hidden cells; 2 marks a cell that others refine, in grids that can't be read here.
+        assert_eq!((kept("vtkGhostType", [0, 1, 32]), kept("vtkGhostType", [0, 2, 33])), (1, 2));
+        assert_eq!((kept("vtkGhostLevels", [0, 1, 2]), kept("levels", [0, 1, 2])), (1, 3));
     }
 
     #[test]

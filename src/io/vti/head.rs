@@ -60,11 +60,16 @@ pub(super) fn before_arrays(grid: &Grid, settings: &Settings, scalars: Option<&A
   <ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{origin}" Spacing="{spacing}" Direction="1 0 0 0 1 0 0 0 1">
 "#
     );
-    if settings.time.is_some() || !settings.field_data.is_empty() {
+    if settings.time.is_some() || !settings.field_data.is_empty() || !settings.numbers.is_empty() {
         head.push_str("    <FieldData>\n");
         if let Some(time) = settings.time {
             let open = r#"<DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">"#;
             let _ = writeln!(head, "      {open}{time:?}</DataArray>");
+        }
+        for (name, number) in &settings.numbers {
+            let (name, number) = (escape(name), fixed_width(*number));
+            let open = format!(r#"<DataArray type="Float64" Name="{name}" NumberOfTuples="1" format="ascii">"#);
+            let _ = writeln!(head, "      {open}{number}</DataArray>");
         }
         for (name, text) in &settings.field_data {
             head.push_str("      ");
@@ -76,6 +81,11 @@ pub(super) fn before_arrays(grid: &Grid, settings: &Settings, scalars: Option<&A
     let scalars = scalars.map_or(String::new(), |a| format!(" Scalars=\"{}\"", escape(&a.name)));
     let _ = write!(head, "    <Piece Extent=\"0 {x} 0 {y} 0 {z}\">\n      <PointData{scalars}>\n");
     head
+}
+
+/// A number as text that is as long for every number, so that it can be written over.
+fn fixed_width(number: f64) -> String {
+    format!("{number:>24?}")
 }
 
 /// What every `<DataArray>` says, wherever its bytes are.

@@ -60,6 +60,8 @@ pub struct Settings {
     pub compression: Compression,
     /// Named strings: program version, pipeline, settings.
     pub field_data: Vec<(String, String)>,
+    /// Named numbers, which may be set anew until the file is finished.
+    pub numbers: Vec<(String, f64)>,
     /// The image's time, which ParaView shows.
     pub time: Option<f64>,
     /// The folder for temporary files, best on the disk of the file itself; the system's own otherwise.
@@ -188,11 +190,7 @@ impl<W: Write + Seek> VtiWriter<W> {
         sink.rewind()?;
         let mut writer = Self { sink, grid: *grid, settings: settings.clone(), arrays: pending, bytes: Vec::new() };
         if direct {
-            let offsets = writer.arrays.iter().map(|a| match a.place {
-                Place::Direct(at) => (&a.spec, at),
-                Place::Spool(_) => (&a.spec, 0),
-            });
-            let head = head::appended(writer.before_arrays(), offsets);
+            let head = writer.head();
             writer.sink.write_all(head.as_bytes())?;
             for array in &mut writer.arrays {
                 if let Place::Direct(at) = &mut array.place {
@@ -267,12 +265,37 @@ impl<W: Write + Seek> VtiWriter<W> {
         } else {
             if compression != Compression::None {
                 self.write_packed(&heads)?;
+            } else if !self.settings.numbers.is_empty() {
+                // As long as before.
+                self.sink.rewind()?;
+                let head = self.head();
+                self.sink.write_all(head.as_bytes())?;
             }
             self.sink.seek(SeekFrom::End(0))?;
             self.sink.write_all(b"\n  </AppendedData>\n</VTKFile>\n")?;
         }
         self.sink.flush()?;
         Ok(self.sink)
+    }
+
+    /// Sets a named number; it must be among those of the settings.
+    pub fn set_number(&mut self, name: &str, number: f64) {
+        let found = self.settings.numbers.iter_mut().find(|(own, _)| own == name);
+        debug_assert!(found.is_some(), "{name} has no place");
+        if let Some((_, own)) = found {
+            *own = number;
+        }
+    }
+
+    /// The head of a file whose arrays lie behind it one after the other, each behind its length.
+    fn head(&self) -> String {
+        let mut at = 0;
+        let offsets = self.arrays.iter().map(|array| {
+            let offset = at;
+            at += 8 + array.length;
+            (&array.spec, offset)
+        });
+        head::appended(self.before_arrays(), offsets)
     }
 
     fn before_arrays(&self) -> String {
@@ -341,7 +364,8 @@ fn check(grid: &Grid, arrays: &[ArraySpec], settings: &Settings) -> Result<(), E
     if estimated_size(grid, arrays, settings).is_none_or(|n| n > i64::MAX as u64) {
         return Err(shape("", dimensions(), "fewer of them".into()));
     }
-    let numbers = grid.origin.iter().chain(&grid.spacing).chain(&settings.time);
+    let own = settings.numbers.iter().map(|(_, number)| number);
+    let numbers = grid.origin.iter().chain(&grid.spacing).chain(&settings.time).chain(own);
     if numbers.into_iter().any(|x| !x.is_finite()) || grid.spacing.iter().any(|&x| x <= 0.0) {
         let found = format!("origin {:?}, spacing {:?}, time {:?}", grid.origin, grid.spacing, settings.time);
         return Err(shape("", found, "finite numbers, and spacing above 0".into()));
@@ -356,7 +380,8 @@ fn check(grid: &Grid, arrays: &[ArraySpec], settings: &Settings) -> Result<(), E
     }
     let names =
         arrays.iter().flat_map(|a| std::iter::once(&a.name).chain(&a.components)).map(|n| ("the array name", n));
-    for (what, name) in names.chain(settings.field_data.iter().map(|(n, _)| ("the field data name", n))) {
+    let of_fields = settings.field_data.iter().map(|(n, _)| n).chain(settings.numbers.iter().map(|(n, _)| n));
+    for (what, name) in names.chain(of_fields.map(|n| ("the field data name", n))) {
         if name.is_empty() || name.chars().any(|c| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')) {
             return Err(Error::Name { what, name: name.clone() });
         }

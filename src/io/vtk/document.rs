@@ -10,7 +10,6 @@ use roxmltree::Node;
 
 use super::blocks::Compressor;
 use super::{Problem, Wanted};
-use crate::volume::available_memory;
 
 /// A file cut in two.
 pub(super) struct Parts<'a> {
@@ -95,8 +94,13 @@ pub(super) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Reads the root element's attributes.
-    pub fn new(root: Node<'a, 'a>, appended: Option<Appended<'a>>, wanted: Wanted<'a>) -> Result<Self, Problem> {
+    /// Reads the root element's attributes. Arrays may take so many bytes of memory.
+    pub fn new(
+        root: Node<'a, 'a>,
+        appended: Option<Appended<'a>>,
+        wanted: Wanted<'a>,
+        budget: u64,
+    ) -> Result<Self, Problem> {
         if root.tag_name().name() != "VTKFile" {
             return Err(Problem::Foreign { found: format!("<{}", root.tag_name().name()) });
         }
@@ -132,7 +136,7 @@ impl<'a> Document<'a> {
             root.descendants().filter_map(|n| n.attribute("offset")?.trim().parse().ok()).collect();
         offsets.sort_unstable();
         offsets.dedup();
-        let budget = Cell::new(available_memory().unwrap_or(u64::MAX) / 2);
+        let budget = Cell::new(budget);
         Ok(Self { kind, data_set, little_endian, header_size, compressor, appended, offsets, wanted, budget })
     }
 
@@ -147,17 +151,9 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// The one piece of the data set; none if it is empty.
-    pub fn piece(&self) -> Result<Option<Node<'a, 'a>>, Problem> {
-        let mut pieces = self.data_set.children().filter(|n| n.has_tag_name("Piece"));
-        let first = pieces.next();
-        match pieces.count() {
-            0 => Ok(first),
-            more => Err(Problem::Unsupported {
-                what: format!("a file of {} pieces", more + 1),
-                remedy: "merge them in ParaView (Merge Blocks, or Merge Pieces) and save again",
-            }),
-        }
+    /// The pieces of the data set; none if it is empty.
+    pub fn pieces(&self) -> impl Iterator<Item = Node<'a, 'a>> + use<'a> {
+        self.data_set.children().filter(|n| n.has_tag_name("Piece"))
     }
 }
 

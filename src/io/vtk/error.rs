@@ -110,6 +110,20 @@ pub enum Problem {
         /// Bytes that there is room for.
         free: u64,
     },
+    /// Pieces that don't make a whole.
+    #[error("its pieces {problem}")]
+    Pieces {
+        /// In which way.
+        problem: String,
+    },
+    /// A file that a list of pieces names.
+    #[error("its piece {file}: {cause}")]
+    Piece {
+        /// The file, as the list names it.
+        file: String,
+        /// What is wrong with it.
+        cause: String,
+    },
     /// Something in a legacy file.
     #[error("{0}")]
     Legacy(String),

@@ -1,9 +1,11 @@
 //! `<ImageData>`: a grid of voxels.
 
-use super::Field;
-use super::Problem;
+use roxmltree::Node;
+
 use super::data_array::{attributes, field_data};
 use super::document::{Document, numbers};
+use super::pieces::{self, Piece};
+use super::{Field, Problem};
 use crate::volume::{Array, Grid, Volume};
 
 /// Axes that are not rotated.
@@ -28,6 +30,15 @@ impl Image {
     /// An image that is not rotated.
     pub(super) fn new(grid: Grid, point_arrays: Vec<Array>, cell_arrays: Vec<Array>, field_data: Vec<Field>) -> Self {
         Self { grid, direction: IDENTITY, point_arrays, cell_arrays, field_data }
+    }
+
+    /// At what time it is, if its field data say so.
+    pub fn time(&self) -> Option<f64> {
+        let time = self.field_data.iter().find_map(|field| match field {
+            Field::Numbers(array) if array.name == "TimeValue" && !array.values.is_empty() => Some(array.values.get(0)),
+            _ => None,
+        });
+        time.filter(|time| time.is_finite())
     }
 
     /// The image as a [`Volume`], if that loses nothing.
@@ -59,17 +70,26 @@ impl From<Volume> for Image {
     }
 }
 
-/// The image in a file.
-pub(super) fn read(document: &Document<'_>) -> Result<Image, Problem> {
-    let node = document.data_set;
+/// What an extent should be.
+pub(super) const BOUNDS: &str = "six whole numbers, the first and last index along x, y and z";
+
+/// What an image says of itself as a whole.
+pub(super) struct Head {
+    /// The first and last index along x, y and z.
+    pub extent: [i64; 6],
+    pub grid: Grid,
+    direction: [f64; 9],
+}
+
+/// The attributes of `<ImageData>` or `<PImageData>`.
+pub(super) fn head(node: Node<'_, '_>) -> Result<Head, Problem> {
     let wrong = |attribute, expected| Problem::Attribute {
-        element: "ImageData".into(),
+        element: node.tag_name().name().into(),
         attribute,
         value: node.attribute(attribute).unwrap_or_default().into(),
         expected,
     };
-    let bounds = "six whole numbers, the first and last index along x, y and z";
-    let extent: [i64; 6] = numbers(node, "WholeExtent", bounds)?.ok_or_else(|| wrong("WholeExtent", bounds))?;
+    let extent: [i64; 6] = numbers(node, "WholeExtent", BOUNDS)?.ok_or_else(|| wrong("WholeExtent", BOUNDS))?;
     let origin: [f64; 3] = numbers(node, "Origin", "three numbers")?.unwrap_or_default();
     let spacing: [f64; 3] = numbers(node, "Spacing", "three numbers")?.unwrap_or([1.0; 3]);
     let direction: [f64; 9] = numbers(node, "Direction", "nine numbers")?.unwrap_or(IDENTITY);
@@ -95,23 +115,56 @@ pub(super) fn read(document: &Document<'_>) -> Result<Image, Problem> {
         origin[a] + shift
     });
     let grid = Grid { dimensions, origin: first, spacing };
-    let points = grid.checked_len().ok_or_else(|| wrong("WholeExtent", "fewer points"))? as u64;
-    // An axis with a single point has no thickness, and VTK counts it as one cell.
-    let cells = dimensions.iter().map(|&n| (n as u64 - 1).max(1)).product();
-    let piece =
-        document.piece()?.ok_or_else(|| Problem::Missing { element: "ImageData".into(), lacks: "`<Piece>`".into() })?;
-    let piece_extent: Option<[i64; 6]> = numbers(piece, "Extent", bounds)?;
-    if piece_extent.is_some_and(|e| e != extent) {
-        return Err(Problem::Unsupported {
-            what: format!("a piece with extent {:?} of an image with {extent:?}", piece_extent.unwrap_or_default()),
-            remedy: "save the whole image",
+    grid.checked_len().ok_or_else(|| wrong("WholeExtent", "fewer points"))?;
+    Ok(Head { extent, grid, direction })
+}
+
+/// The pieces of a file; one that doesn't say where it lies is the whole.
+pub(super) fn pieces(document: &Document<'_>, whole: [i64; 6]) -> Result<Vec<Piece>, Problem> {
+    let mut pieces = Vec::new();
+    for node in document.pieces() {
+        let extent: [i64; 6] = numbers(node, "Extent", BOUNDS)?.unwrap_or(whole);
+        // Those of VTK that hold nothing end before they begin.
+        if (0..3).any(|a| extent[2 * a + 1] < extent[2 * a]) {
+            continue;
+        }
+        let (mut points, mut cells) = (1u64, 1u64);
+        for a in 0..3 {
+            let count = extent[2 * a + 1].checked_sub(extent[2 * a]).and_then(|n| u64::try_from(n).ok());
+            let more = |product: u64, n: u64| product.checked_mul(n).filter(|&n| n < 1 << 62);
+            // An axis with a single point has no thickness, and VTK counts it as one cell.
+            let counts = count.and_then(|n| Some((more(points, n.checked_add(1)?)?, more(cells, n.max(1))?)));
+            (points, cells) = counts.ok_or_else(|| Problem::Attribute {
+                element: "Piece".into(),
+                attribute: "Extent",
+                value: format!("{extent:?}"),
+                expected: "fewer points",
+            })?;
+        }
+        pieces.push(Piece {
+            extent,
+            point_arrays: attributes(document, node, "PointData", points)?,
+            cell_arrays: attributes(document, node, "CellData", cells)?,
         });
     }
-    Ok(Image {
-        grid,
-        direction,
-        point_arrays: attributes(document, piece, "PointData", points)?,
-        cell_arrays: attributes(document, piece, "CellData", cells)?,
-        field_data: field_data(document)?,
-    })
+    Ok(pieces)
+}
+
+impl Head {
+    /// The image that these pieces make.
+    pub fn image(self, document: &Document<'_>, pieces: Vec<Piece>, field_data: Vec<Field>) -> Result<Image, Problem> {
+        if pieces.is_empty() {
+            return Err(Problem::Missing { element: document.kind.into(), lacks: "`<Piece>`".into() });
+        }
+        let charge = |array: &str, bytes: u64| document.charge(array, bytes);
+        let (point_arrays, cell_arrays) = pieces::image(self.extent, pieces, charge)?;
+        Ok(Image { grid: self.grid, direction: self.direction, point_arrays, cell_arrays, field_data })
+    }
+}
+
+/// The image in a file.
+pub(super) fn read(document: &Document<'_>) -> Result<Image, Problem> {
+    let head = head(document.data_set)?;
+    let pieces = pieces(document, head.extent)?;
+    head.image(document, pieces, field_data(document)?)
 }

@@ -466,16 +466,16 @@ impl<'a> File<'a> {
 
 fn kind(name: &[u8]) -> Option<Kind> {
     Some(match name.to_ascii_lowercase().as_slice() {
-        b"char" | b"signed_char" => Kind::I8,
-        b"unsigned_char" => Kind::U8,
-        b"short" => Kind::I16,
-        b"unsigned_short" => Kind::U16,
-        b"int" | b"vtkidtype" => Kind::I32,
-        b"unsigned_int" => Kind::U32,
+        b"char" | b"signed_char" | b"vtktypeint8" => Kind::I8,
+        b"unsigned_char" | b"vtktypeuint8" => Kind::U8,
+        b"short" | b"vtktypeint16" => Kind::I16,
+        b"unsigned_short" | b"vtktypeuint16" => Kind::U16,
+        b"int" | b"vtkidtype" | b"vtktypeint32" => Kind::I32,
+        b"unsigned_int" | b"vtktypeuint32" => Kind::U32,
         b"long" | b"long_long" | b"vtktypeint64" => Kind::I64,
         b"unsigned_long" | b"unsigned_long_long" | b"vtktypeuint64" => Kind::U64,
-        b"float" => Kind::F32,
-        b"double" => Kind::F64,
+        b"float" | b"vtktypefloat32" => Kind::F32,
+        b"double" | b"vtktypefloat64" => Kind::F64,
         _ => return None,
     })
 }

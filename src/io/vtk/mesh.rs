@@ -7,6 +7,7 @@ use super::Problem;
 use super::cell::{self, POLYHEDRON, TETRAHEDRON, TRIANGLE};
 use super::data_array::{array, attributes, field_data};
 use super::document::{Document, child, required};
+use super::pieces;
 use crate::volume::{Array, Values};
 
 /// Points, and cells that are lists of points.
@@ -102,8 +103,65 @@ impl UnstructuredGrid {
 
 /// The mesh in a file.
 pub(super) fn read(document: &Document<'_>) -> Result<UnstructuredGrid, Problem> {
-    let mut grid = UnstructuredGrid { field_data: field_data(document)?, ..Default::default() };
-    let Some(piece) = document.piece()? else { return Ok(grid) };
+    let pieces = document.pieces().map(|piece| read_piece(document, piece)).collect::<Result<_, _>>()?;
+    let mut grid = joined(pieces)?;
+    grid.field_data = field_data(document)?;
+    Ok(grid)
+}
+
+/// One mesh of several, which follow each other; points on their seams stay two.
+pub(super) fn joined(given: Vec<UnstructuredGrid>) -> Result<UnstructuredGrid, Problem> {
+    let mut parts: Vec<_> = given.into_iter().filter(|p| !p.points.is_empty() || !p.types.is_empty()).collect();
+    if parts.len() < 2 {
+        return Ok(parts.pop().unwrap_or_default());
+    }
+    let points: usize = parts.iter().map(|piece| piece.points.len()).sum();
+    if u32::try_from(points).is_err() {
+        return Err(Problem::Pieces { problem: format!("have {points} points together, more than can be numbered") });
+    }
+    let first = &parts[0];
+    for piece in &parts {
+        pieces::alike(&first.point_arrays, &piece.point_arrays)?;
+        pieces::alike(&first.cell_arrays, &piece.cell_arrays)?;
+    }
+    let mut whole = UnstructuredGrid {
+        point_arrays: concatenated(&parts, |piece| &piece.point_arrays),
+        cell_arrays: concatenated(&parts, |piece| &piece.cell_arrays),
+        field_data: first.field_data.clone(),
+        ..Default::default()
+    };
+    for piece in parts {
+        let (shift, base) = (whole.points.len() as u32, whole.connectivity.len());
+        whole.points.extend(piece.points);
+        whole.connectivity.extend(piece.connectivity.iter().map(|&p| p.saturating_add(shift)));
+        whole.offsets.extend(piece.offsets.iter().map(|&end| end.saturating_add(base)));
+        whole.types.extend(piece.types);
+    }
+    Ok(whole)
+}
+
+/// Arrays of pieces that are known to be alike, one behind the other.
+fn concatenated(pieces: &[UnstructuredGrid], arrays: impl Fn(&UnstructuredGrid) -> &Vec<Array>) -> Vec<Array> {
+    let first = pieces.first().map(&arrays);
+    let mut joined = Vec::new();
+    for (k, array) in first.into_iter().flatten().enumerate() {
+        let total = pieces.iter().map(|piece| arrays(piece)[k].values.len()).sum();
+        let mut values = array.values.kind().zeros(total);
+        let mut at = 0;
+        for piece in pieces {
+            let from = &arrays(piece)[k].values;
+            let placed = values.place(at, from, 0, from.len());
+            debug_assert!(placed, "pieces are alike, and there is room for all of them");
+            at += from.len();
+        }
+        joined.push(Array { values, ..array.clone_head() });
+    }
+    joined
+}
+
+/// One piece of it.
+fn read_piece(document: &Document<'_>, piece: Node<'_, '_>) -> Result<UnstructuredGrid, Problem> {
+    let mut grid = UnstructuredGrid::default();
     let points = count(piece, "NumberOfPoints")?;
     let nodes = child(piece, "Points")?.children().find(Node::is_element);
     match nodes {

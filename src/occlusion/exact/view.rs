@@ -68,6 +68,7 @@ fn view<const D: usize>(
     };
     let Some(mut hemisphere) = Hemisphere::approached(&position, &normal, &approach) else { return Ok(None) };
     // The coordinates of a mesh are finite, so nothing is refused below.
+    let ignored = point.ignored(tracer);
     let own: &[u32] = match point {
         ShadingPoint::Vertex(vertex) => {
             let identity = mesh.identity[*vertex as usize];
@@ -82,7 +83,7 @@ fn view<const D: usize>(
             }
             around
         }
-        ShadingPoint::Inside { simplex, .. } => std::slice::from_ref(simplex),
+        ShadingPoint::Inside { .. } => &ignored,
     };
     let (mut looked, mut cancelled) = (0usize, progress.cancelled());
     let all = above_horizon(tracer.bvh(), &position, &normal, |simplex| {

@@ -52,6 +52,8 @@ pub struct Visibility<const D: usize> {
     camera: Camera<D>,
     grid: Grid,
     raster: Option<Raster>,
+    /// For each simplex whether the camera sees it from behind.
+    away: Vec<bool>,
 }
 
 impl<const D: usize> Visibility<D> {
@@ -65,7 +67,11 @@ impl<const D: usize> Visibility<D> {
         if raster.is_none() {
             tracer.prepare();
         }
-        Self { backend, camera: camera.clone(), grid: *grid, raster }
+        let mesh = backend.tracer().mesh();
+        let viewpoint = camera.viewpoint();
+        let away = |s: u32| viewpoint.is_behind(&mesh.corners(s));
+        let away = (0..mesh.simplices.len() as u32).into_par_iter().with_min_len(1024).map(away).collect();
+        Self { backend, camera: camera.clone(), grid: *grid, raster, away }
     }
 
     /// The way that was chosen; never [`Method::Auto`].
@@ -79,15 +85,48 @@ impl<const D: usize> Visibility<D> {
         if self.raster.is_some() { voxels / 16 } else { voxels }
     }
 
-    /// The simplex that the ray through each voxel of some layers hits first, x fastest, or [`NOTHING`].
+    /// Whether the camera sees a simplex from behind.
+    #[inline]
+    pub fn is_away(&self, simplex: u32) -> bool {
+        self.away[simplex as usize]
+    }
+
+    /// The simplex that the ray through each voxel of some layers hits first, x fastest, or [`NOTHING`]. Of several at
+    /// exactly the same distance, those that face the eye come before those that don't.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if `progress` says so, [`Error::OpenCl`] if a device fails.
     pub fn first_hits(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
-        match &self.raster {
-            Some(raster) => Ok(raster.first_hits(self.backend.tracer(), &self.camera, &self.grid, layers, progress)?),
-            None => self.ray_cast(layers, progress),
+        let mut found = match &self.raster {
+            Some(raster) => {
+                raster.first_hits(self.backend.tracer(), &self.camera, &self.grid, layers.clone(), progress)?
+            }
+            None => self.ray_cast(layers.clone(), progress)?,
+        };
+        self.turn_to_eye(layers, &mut found, progress)?;
+        Ok(found)
+    }
+
+    /// Where a voxel sees a simplex from behind, looks for one in the same place that faces the eye: the other side of a
+    /// sheet.
+    fn turn_to_eye(&self, layers: Range<usize>, found: &mut [u32], progress: &dyn Progress) -> Result<(), Error> {
+        let is_away = |simplex: u32| simplex != NOTHING && self.is_away(simplex);
+        if !found.par_iter().any(|&simplex| is_away(simplex)) {
+            return Ok(());
         }
+        let tracer = self.backend.tracer();
+        tracer.prepare();
+        let [width, height, _] = self.grid.dimensions;
+        found.par_chunks_mut(width).enumerate().try_for_each(|(row, found)| {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            for (i, simplex) in found.iter_mut().enumerate().filter(|(_, simplex)| is_away(**simplex)) {
+                let ray = self.camera.voxel_ray(&self.grid, [i, row % height, layers.start + row / height]);
+                *simplex = tracer.facing_there(&ray, *simplex).unwrap_or(*simplex);
+            }
+            Ok(())
+        })
     }
 
     fn ray_cast(&self, layers: Range<usize>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {

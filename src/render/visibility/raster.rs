@@ -123,7 +123,9 @@ impl Raster {
         let count = mesh.simplices.len() as u32;
         let mut boxes: Vec<Box3> =
             (0..count).into_par_iter().with_min_len(1024).map(|s| framer.frame(&mesh.corners(s))).collect();
-        mesh.degenerate.iter().for_each(|&s| boxes[s as usize] = Box3::EMPTY);
+        // What lies on an earlier one is never seen first.
+        let copies = mesh.copies.iter().map(|(copy, _)| copy);
+        mesh.degenerate.iter().copied().chain(copies).for_each(|s| boxes[s as usize] = Box3::EMPTY);
         Self { boxes }
     }
 

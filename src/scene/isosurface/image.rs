@@ -29,7 +29,8 @@ const MOST_SIGMA: f64 = 100.0;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSpec {
-    /// The file: `.vti`, `.raw`, `.nii`, `.nii.gz`, `.hdr`, `.tif`, `.nc`, `.nrrd` or `.nhdr`, relative to the pipeline's folder.
+    /// The file: `.vti`, `.pvti`, `.vtk`, `.raw`, `.nii`, `.nii.gz`, `.hdr`, `.tif`, `.nc`, `.h5`, `.nrrd` or `.nhdr`, or a list of such over
+    /// time, `.pvd` or `.vti.series`; relative to the pipeline's folder.
     #[serde(default)]
     pub file: Option<PathBuf>,
     /// Instead of `file`: files that follow each other in time, of one size.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Content, Opening, VoxelFile, WritePlan};
 use crate::io::Error;
-use crate::render::Aov;
+use crate::render::{Accuracy, Aov};
 use crate::stages::render::RenderPlan;
 use crate::stages::{Plan, Ref};
 use crate::volume::{Array, Grid};
@@ -63,6 +63,11 @@ impl PictureFiles {
             file.add_slab(first, &arrays)?;
         }
         Ok(())
+    }
+
+    /// Takes note of how far off the picture's occlusion is.
+    pub fn tell(&mut self, accuracy: &Accuracy) {
+        self.files.iter_mut().for_each(|open| open.file.tell(accuracy));
     }
 
     /// Completes the files and gives them their names; returns each with its length.

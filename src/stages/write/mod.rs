@@ -28,7 +28,7 @@ use crate::geometry::Dimension;
 use crate::io::{AtomicFile, Error};
 use crate::mesh::Mesh;
 use crate::occlusion::Estimates;
-use crate::render::{Aov, Camera};
+use crate::render::{Accuracy, Aov, Camera};
 use crate::volume::{Array, Grid};
 
 pub(super) use files::PictureFiles;
@@ -106,6 +106,9 @@ struct Opening<'a> {
 trait VoxelFile {
     /// Takes layers, `first` being the number of the first; `slab` has the arrays that the format needs, in its order.
     fn add_slab(&mut self, first: usize, slab: &[&Array]) -> Result<(), Error>;
+
+    /// Takes note of how far off the picture's occlusion is, once all layers are there.
+    fn tell(&mut self, _accuracy: &Accuracy) {}
 
     /// Completes the file and gives it its name; returns its length.
     fn finish(self: Box<Self>) -> Result<u64, Error>;
@@ -299,6 +302,7 @@ const MESH_LEFT_OUT: &[LeftOut] = &[
     LeftOut::new("/dimensions", "a mesh has no voxels"),
     LeftOut::new("/shading", "a mesh has the values of its vertices"),
     LeftOut::new("/denoise", "a mesh has no voxels"),
+    LeftOut::new("/tolerance", "a mesh has no voxels"),
     LeftOut::new("/supersample", "a mesh has no voxels"),
     LeftOut::new("/dilate", "a mesh has no voxels"),
     LeftOut::new("/lighting", "a mesh is not lit"),

@@ -10,7 +10,7 @@ use super::{
 use crate::geometry::Dimension;
 use crate::io::vti::{self, ArraySpec, VtiWriter};
 use crate::io::{AtomicFile, Error, PIPELINE};
-use crate::render::Aov;
+use crate::render::{Accuracy, Aov};
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
 use crate::stages::render::array_bytes;
@@ -72,6 +72,12 @@ impl VoxelFile for File {
         written.map_err(AtomicFile::name_in(&self.path))
     }
 
+    fn tell(&mut self, accuracy: &Accuracy) {
+        for (name, number) in numbers(accuracy) {
+            self.writer.set_number(name, number);
+        }
+    }
+
     fn finish(self: Box<Self>) -> Result<u64, Error> {
         self.writer.finish().map_err(AtomicFile::name_in(&self.path))?.commit()
     }
@@ -83,6 +89,13 @@ fn array_spec(aov: Aov, dimension: Dimension) -> ArraySpec {
         Dimension::Four => aov.components::<4>(),
     };
     ArraySpec::new(aov.name(), aov.kind(), components)
+}
+
+/// How far off the occlusion is, as files say it: the root mean square, the most that some voxel was off, and how many
+/// voxels were looked at.
+fn numbers(accuracy: &Accuracy) -> [(&'static str, f64); 3] {
+    let Accuracy { rms, largest, voxels } = *accuracy;
+    [("occlusion_rms_error", rms), ("occlusion_largest_error", largest), ("occlusion_voxels_checked", voxels as f64)]
 }
 
 fn encoding(write: &WritePlan) -> vti::Encoding {
@@ -124,6 +137,11 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, told: &str, scratch
             (PIPELINE.to_owned(), told.to_owned()),
             ("settings".to_owned(), settings.to_string()),
         ],
+        // Known when the picture is there; 0 of 0 voxels if it shows nothing.
+        numbers: match render.occlusion.and_then(|occlusion| plan[occlusion].audit()) {
+            Some(_) => numbers(&Accuracy::default()).map(|(name, number)| (name.to_owned(), number)).into(),
+            None => Vec::new(),
+        },
         scratch: scratch.map(Path::to_owned),
         ..vti::Settings::default()
     }

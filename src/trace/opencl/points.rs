@@ -68,12 +68,14 @@ impl<const D: usize> OpenClBackend<D> {
     fn prepare(&self, point: &ShadingPoint<D>) -> Prepared<D> {
         let mesh = self.tracer.mesh();
         let position = point.position(mesh);
+        let ignored = point.ignored(&self.tracer);
         Prepared {
             position,
             frame: Frame::new(&point.normal(mesh)),
             number: point.number(),
-            ignored: point.ignored().unwrap_or(NOTHING),
-            serves: self.serves && is_exact(&self.scale, &position),
+            ignored: ignored.first().copied().unwrap_or(NOTHING),
+            // The kernel knows of one.
+            serves: self.serves && ignored.len() <= 1 && is_exact(&self.scale, &position),
             star: star_cones(&self.tracer, point).into_iter().filter_map(star_cone).collect(),
         }
     }

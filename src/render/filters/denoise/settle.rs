@@ -10,7 +10,8 @@
 //!   larger than noise makes it;
 //! - an own value beyond four standard deviations of its noise, and beyond a ray and a half.
 //!
-//! The share b / (b + n) of the own value makes the error of the sum least: n b / (b + n) and what noise the fit has.
+//! The share k = b / (b + n) of the own value makes the error of the sum least: its variance is k^2 n and (1 - k)^2 times b
+//! and the fit's own.
 
 use rayon::prelude::*;
 
@@ -31,6 +32,10 @@ const OUTLIER: f64 = 4.0;
 /// and how many rays.
 const OUTLIER_RAYS: f64 = 1.5;
 
+/// Fits that curve leave out about so many times what is sure: told with the error, but not taken as a reason to trust the
+/// noise of an own value instead.
+const CURVES: f64 = 2.0;
+
 /// The filter.
 #[derive(Clone, Debug)]
 pub struct Settle<const D: usize> {
@@ -38,7 +43,7 @@ pub struct Settle<const D: usize> {
     spacing: f64,
     window: Window,
     sampling: Sampling,
-    /// From the square of what curved fits differ from their mean to that of what they leave out.
+    /// From the square of what curved fits differ from their mean to that of what they leave out, at least.
     curvature: f64,
 }
 
@@ -56,7 +61,7 @@ impl<const D: usize> Settle<D> {
         let (wide, deviation) = Dimension::of::<D>().pick((2, 1.4f64), (1, 0.8));
         let by_offset =
             (0..=wide).map(|i| libm::exp(-0.5 * f64::from(i * i) / (deviation * deviation)) as f32).collect();
-        let curvature = Dimension::of::<D>().pick(14.0, 4.0);
+        let curvature = Dimension::of::<D>().pick(2.0, 0.5);
         let spacing = super::spacing::<D>(grid);
         Self { camera: camera.clone(), spacing, window: Window::new(D - 1, by_offset), sampling, curvature }
     }
@@ -123,9 +128,12 @@ impl<const D: usize> ImageFilter<D> for Settle<D> {
             for x in (0..width).filter(|&x| out.simplex[x] != NOTHING) {
                 let (own, fit) = (f64::from(out.occlusion[x]), f64::from(out.fitted[x]));
                 let noise = self.sampling.expected_variance(dimension, fit);
-                let of_line = match out.interpolated.is_empty() {
-                    false => f64::from(out.misfit[x]),
-                    true => self.curvature * (self.near(&planes, &fitted, [x, j, k]).mean - fit).powi(2),
+                let (of_line, unsure) = match out.interpolated.is_empty() {
+                    false => (f64::from(out.misfit[x]), 0.0),
+                    true => {
+                        let curves = (self.near(&planes, &fitted, [x, j, k]).mean - fit).powi(2);
+                        (self.curvature * curves, (CURVES - 1.0) * self.curvature * curves)
+                    }
                 };
                 let Near { mean: square, count } = self.near(&planes, &squares, [x, j, k]);
                 let of_all = (square - CLEAR * noise / count).max(0.0);
@@ -133,7 +141,8 @@ impl<const D: usize> ImageFilter<D> for Settle<D> {
                 let of_own = (difference.powi(2) - (OUTLIER.powi(2) * noise).max(jump * jump)).max(0.0);
                 let misfit = of_line + of_all + of_own;
                 let kept = misfit / (misfit + noise);
-                let error = kept * noise + ((1.0 - kept) * f64::from(out.error[x])).powi(2);
+                let of_fit = f64::from(out.error[x]).powi(2) + misfit + unsure;
+                let error = kept.powi(2) * noise + (1.0 - kept).powi(2) * of_fit;
                 out.occlusion[x] = (fit + kept * difference).clamp(0.0, 1.0) as f32;
                 out.error[x] = error.sqrt().min(1.0) as f32;
             }

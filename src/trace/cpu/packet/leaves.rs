@@ -24,6 +24,12 @@ fn edges<L: Lanes, const D: usize>(query: &Query<D>, leaf: &Leaf<D>) -> [[L; D];
     edges
 }
 
+/// The lanes of a leaf that rays don't hit.
+#[inline(always)]
+fn ignored<const D: usize>(query: &Query<D>, leaf: &Leaf<D>) -> impl Iterator<Item = usize> {
+    query.ignored.iter().filter_map(|s| leaf.simplices.iter().position(|t| t == s))
+}
+
 /// The simplices of a leaf as cones seen from the origin, without those that no ray can hit.
 #[inline(always)]
 fn prepare<L: Lanes, const D: usize>(query: &Query<D>, leaf: &Leaf<D>, cones: &mut Cones<D>) {
@@ -40,7 +46,7 @@ fn prepare<L: Lanes, const D: usize>(query: &Query<D>, leaf: &Leaf<D>, cones: &m
     }
     let unused = L::load(&leaf.simplices.map(f32::from_bits));
     cones.set(&edges, highest.select(highest, unused));
-    if let Some(lane) = query.ignored.and_then(|s| leaf.simplices.iter().position(|&t| t == s)) {
+    for lane in ignored(query, leaf) {
         cones.remove(lane);
     }
 }
@@ -105,7 +111,7 @@ pub(super) fn hits_of_one<L: Lanes, const D: usize>(query: &Query<D>, rays: &Ray
         }
         live &= !length.less_or_equal(L::splat(0.0));
     }
-    if let Some(lane) = query.ignored.and_then(|s| leaf.simplices.iter().position(|&t| t == s)) {
+    for lane in ignored(query, leaf) {
         live &= !(1 << lane);
     }
     let surely = verdict.inside & live != 0 && query.limit == f32::INFINITY;

@@ -17,18 +17,12 @@ pub(super) struct Query<'t, const D: usize> {
     pub normal: Vector<D>,
     /// Hits beyond it don't count.
     pub limit: f32,
-    /// The simplex that rays don't hit.
-    pub ignored: Option<u32>,
+    /// The simplices that rays don't hit.
+    pub ignored: &'t [u32],
 }
 
 impl<'t, const D: usize> Query<'t, D> {
-    pub fn new(
-        tracer: &'t Tracer<D>,
-        position: Vector<D>,
-        normal: Vector<D>,
-        limit: f32,
-        ignored: Option<u32>,
-    ) -> Self {
+    pub fn new(tracer: &'t Tracer<D>, position: Vector<D>, normal: Vector<D>, limit: f32, ignored: &'t [u32]) -> Self {
         let wide = tracer.wide();
         let (scaled, centred) = (wide.scale.scaled(&position), wide.scale.centred(&position));
         Self { tracer, wide, position, scaled, centred, normal, limit, ignored }

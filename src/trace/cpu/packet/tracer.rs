@@ -96,7 +96,8 @@ impl<const D: usize> PacketTracer<D> {
             }
             ShadingPoint::Inside { .. } => None,
         };
-        let query = Query::new(tracer, position, normal, sampling.max_distance, point.ignored());
+        let ignored = point.ignored(tracer);
+        let query = Query::new(tracer, position, normal, sampling.max_distance, &ignored);
         let source = Source::Sequence {
             sequence: Sequence::new(sampling.sampler, sampling.seed, point.number()),
             frame: Frame::new(&normal),
@@ -125,7 +126,7 @@ impl<const D: usize> PacketTracer<D> {
         // Left out only if all rays surely are on its side.
         let on_side = directions.iter().all(|d| d.dot(&normal) > 1e-5);
         let normal = if on_side { normal } else { Vector::zeros() };
-        let query = Query::new(tracer, *origin, normal, limit, ignored);
+        let query = Query::new(tracer, *origin, normal, limit, ignored.as_slice());
         let source = Source::Directions(directions);
         // Nobody cancels.
         let found = self.traced(Job { query, vertex: None, source, progress: &Silent });

@@ -1,45 +1,55 @@
-//! NetCDF of the classic kinds (CDF-1, -2 and -5): one variable over some of x, y, z and time, in any order.
+//! NetCDF of the classic kinds (CDF-1, -2 and -5) and NetCDF-4: one variable over some of x, y, z and time, in any order.
+//!
+//! `classic` and `hdf5` know where numbers are kept; what they mean is the same in both, and known here.
 //!
 //! What a dimension is follows from its coordinate variable, the one of its name: `axis`, `standard_name`, `units` and
 //! `positive`, as CF and COARDS have them, or from its own name; where its points are, from that variable's values. Stored numbers
 //! become values as the attributes say: `_Unsigned`, `_FillValue`, `missing_value`, `valid_*`, `scale_factor`, `add_offset`; a
 //! number that the library fills unwritten places with is none.
 
+mod classic;
+mod hdf5;
+mod header;
+
 use std::path::Path;
 
 use super::axes::{Axis, Opened, Positions, Role};
-use super::netcdf_header::{Header, Variable};
-use super::numbers::{Bytes, Meaning, Numbers, Packing, Stream, stream};
+use super::numbers::{Meaning, Numbers};
 use super::{Request, counted};
 use crate::volume::{Kind, Values};
 
+use self::header::{Header, Variable};
+
+/// A file of one of the kinds.
+trait Container {
+    /// What kind.
+    fn format(&self) -> &'static str;
+
+    /// Its lists.
+    fn header(&self) -> &Header;
+
+    /// The points along a dimension, by its number.
+    fn size(&self, dimension: usize) -> usize;
+
+    /// The values of a variable whose numbers are of this type; refused where the file can't hold them.
+    fn numbers(&self, variable: &Variable, kind: Kind, meaning: Meaning) -> Result<Box<dyn Numbers>, String>;
+}
+
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened, String> {
-    let header = Header::read(path)?;
-    let variable = choose(&header, request.array.as_deref())?;
-    let name = &variable.name;
+    let file: Box<dyn Container> = match hdf5::begins(path) {
+        true => Box::new(hdf5::Hdf5::open(path, length)?),
+        false => Box::new(classic::Classic::open(path, length)?),
+    };
+    let header = file.header();
+    let variable = choose(header, request.array.as_deref())?;
     let kind = stored_kind(variable)?;
-    let record = header.record_bytes().ok_or("declares records larger than can be")?;
-    let records = match header.records {
-        Some(records) => records,
-        // Left open by a writer that didn't count: as many as the file has room for.
-        None => {
-            let begin = header.variables.iter().filter(|v| header.grows(v)).map(|v| v.begin).min().unwrap_or(length);
-            length.saturating_sub(begin) / record.max(1)
-        }
-    };
-    let size = |d: usize| match header.dimensions[d].size {
-        0 => usize::try_from(records).unwrap_or(usize::MAX),
-        size => usize::try_from(size).unwrap_or(usize::MAX),
-    };
-    let sizes: Vec<usize> = variable.dimensions.iter().rev().map(|&d| size(d)).collect();
-    let needed = counted(&sizes, kind.size()).map_err(|e| format!("variable \"{name}\" {e}"))?;
-    let whole = Whole { path, length, header: &header, records, record };
-    whole.check(variable, needed)?;
-    let meaning = meaning(variable, kind)?;
+    let sizes: Vec<usize> = variable.dimensions.iter().rev().map(|&d| file.size(d)).collect();
+    counted(&sizes, kind.size()).map_err(|e| format!("variable \"{}\" {e}", variable.name))?;
     let mut notes = Vec::new();
+    let values = file.numbers(variable, kind, meaning(variable, kind)?)?;
     let mut axes = Vec::new();
     for &dimension in variable.dimensions.iter().rev() {
-        axes.push(axis(&whole, dimension, size(dimension), &mut notes)?);
+        axes.push(axis(&*file, dimension, &mut notes)?);
     }
     let roles: Vec<Option<Role>> = axes.iter().map(|axis: &Axis| axis.role).collect();
     if roles.iter().all(Option::is_none) && request.axes.is_none() && roles.len() <= 4 {
@@ -48,13 +58,7 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
             "its dimensions ({names}) say nothing of what they are; they count as time, z, y, x in this order"
         ));
     }
-    let values = Bytes::new(whole.stream(variable)?, kind, false, meaning);
-    let format = match header.version {
-        1 => "NetCDF (CDF-1)",
-        2 => "NetCDF (CDF-2)",
-        _ => "NetCDF (CDF-5)",
-    };
-    let mut opened = Opened::new(format, axes, kind.vtk_name().to_lowercase(), Box::new(values));
+    let mut opened = Opened::new(file.format(), axes, kind.vtk_name().to_lowercase(), values);
     opened.has_times =
         opened.axes.iter().any(|a| a.role == Some(Role::Time) && matches!(a.positions, Positions::Listed(_)));
     opened.unit = variable.text("units").map(str::to_owned);
@@ -81,7 +85,9 @@ fn choose<'a>(header: &'a Header, name: Option<&str>) -> Result<&'a Variable, St
 
 /// The type of a variable's numbers, with `_Unsigned` heeded.
 fn stored_kind(variable: &Variable) -> Result<Kind, String> {
-    let kind = variable.kind.ok_or_else(|| format!("variable \"{}\" is text, not numbers", variable.name))?;
+    let kind = variable
+        .kind
+        .ok_or_else(|| format!("variable \"{}\" is text, or of a type of its own, not numbers", variable.name))?;
     let told = variable.text("_Unsigned").map(str::to_lowercase);
     Ok(match (told.as_deref(), kind) {
         (Some("true"), Kind::I8) => Kind::U8,
@@ -152,17 +158,21 @@ fn meaning(variable: &Variable, kind: Kind) -> Result<Meaning, String> {
 }
 
 /// What a dimension is, and where its points are.
-fn axis(file: &Whole, dimension: usize, size: usize, notes: &mut Vec<String>) -> Result<Axis, String> {
-    let name = &file.header.dimensions[dimension].name;
-    let own = file.header.variables.iter().find(|v| v.name == *name && v.dimensions == [dimension]);
+fn axis(file: &dyn Container, dimension: usize, notes: &mut Vec<String>) -> Result<Axis, String> {
+    let (header, size) = (file.header(), file.size(dimension));
+    let path = &header.dimensions[dimension].name;
+    let own = header.variables.iter().find(|v| v.name == *path && v.dimensions == [dimension]);
+    // Of a dimension in a group its own name counts.
+    let name = path.rsplit('/').next().unwrap_or_default();
     let mut axis = Axis::new(name, own.and_then(role).or_else(|| Role::of_name(name)), size);
     let Some(variable) = own.filter(|v| v.kind.is_some()) else { return Ok(axis) };
     axis.unit = variable.text("units").map(str::to_owned);
     let kind = stored_kind(variable)?;
-    file.check(variable, counted(&[size], kind.size())?)?;
-    let mut places = vec![0.0; size];
+    counted(&[size], kind.size())?;
     let meaning = Meaning { missing: Vec::new(), ..meaning(variable, kind)? };
-    Bytes::new(file.stream(variable)?, kind, false, meaning).read(&mut places)?;
+    let mut values = file.numbers(variable, kind, meaning)?;
+    let mut places = vec![0.0; size];
+    values.read(&mut places)?;
     axis.positions = Positions::Listed(places);
     if !axis.positions.is_monotonic() {
         if axis.role == Some(Role::Channel) || axis.role.is_none() {
@@ -206,84 +216,5 @@ fn role(variable: &Variable) -> Option<Role> {
         "level" | "layer" | "sigma_level" | "pa" | "hpa" | "mbar" | "mb" | "millibar" | "millibars" | "bar" | "atm"
         | "dbar" | "decibar" => Some(Role::Z),
         _ => None,
-    }
-}
-
-/// A file, and what its variables share.
-struct Whole<'a> {
-    path: &'a Path,
-    length: u64,
-    header: &'a Header,
-    records: u64,
-    record: u64,
-}
-
-impl Whole<'_> {
-    /// Refuses a variable that reaches beyond the file.
-    fn check(&self, variable: &Variable, needed: u64) -> Result<(), String> {
-        let end = match self.header.grows(variable) {
-            // Of the last record what this variable takes.
-            true => (self.records.saturating_sub(1))
-                .checked_mul(self.record)
-                .and_then(|n| n.checked_add(self.header.bytes_of(variable)?)),
-            false => Some(needed),
-        };
-        let end = end.and_then(|n| n.checked_add(variable.begin));
-        if end.is_none_or(|end| end > self.length) {
-            let (name, length) = (&variable.name, self.length);
-            return Err(format!("is cut off: variable \"{name}\" takes {needed} bytes, the file has {length} bytes"));
-        }
-        Ok(())
-    }
-
-    fn stream(&self, variable: &Variable) -> Result<Box<dyn Stream>, String> {
-        let file = stream(self.path, variable.begin, Packing::None)?;
-        let own = self.header.bytes_of(variable).unwrap_or(0);
-        if !self.header.grows(variable) || own == self.record {
-            return Ok(file);
-        }
-        Ok(Box::new(Records { file, own, gap: self.record - own, left: own }))
-    }
-}
-
-/// One variable's bytes out of records that hold several.
-struct Records {
-    file: Box<dyn Stream>,
-    own: u64,
-    gap: u64,
-    left: u64,
-}
-
-impl Records {
-    fn next(&mut self) -> std::io::Result<()> {
-        if self.left == 0 {
-            self.file.pass(self.gap)?;
-            self.left = self.own;
-        }
-        Ok(())
-    }
-}
-
-impl std::io::Read for Records {
-    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
-        self.next()?;
-        let most = bytes.len().min(usize::try_from(self.left).unwrap_or(usize::MAX));
-        let count = self.file.read(&mut bytes[..most])?;
-        self.left -= count as u64;
-        Ok(count)
-    }
-}
-
-impl Stream for Records {
-    fn pass(&mut self, count: u64) -> std::io::Result<()> {
-        let mut count = count;
-        while count > 0 {
-            self.next()?;
-            let now = count.min(self.left);
-            self.file.pass(now)?;
-            self.left -= now;
-            count -= now;
-        }
-        Ok(())
     }
 }

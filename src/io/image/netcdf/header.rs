@@ -30,7 +30,7 @@ pub(super) struct Variable {
     pub name: String,
     /// Indices of its dimensions, the slowest first.
     pub dimensions: Vec<usize>,
-    attributes: Vec<(String, Content)>,
+    pub attributes: Vec<(String, Content)>,
     /// None for text.
     pub kind: Option<Kind>,
     /// Where its values begin.
@@ -77,11 +77,6 @@ impl Header {
         file.take(LONGEST).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
         let version = match bytes.as_slice() {
             [b'C', b'D', b'F', version @ (1 | 2 | 5), ..] => *version,
-            [0x89, b'H', b'D', b'F', ..] => {
-                return Err(
-                    "unsupported: a NetCDF-4 file, which is HDF5; convert it: nccopy -k cdf5 IN.nc OUT.nc".into()
-                );
-            }
             [0x0e, 3, 0x13, 1, ..] => {
                 return Err("unsupported: an HDF4 file; convert it to NetCDF: h4tonccf IN OUT.nc".into());
             }
