@@ -266,7 +266,7 @@ fn two_lights<const D: usize>() -> Lighting<D> {
 }
 
 /// A box floats over a floor, across the last axis; the eye is above.
-const BOX: [[f64; 2]; 2] = [[-0.2, 0.2], [-0.9, -0.6]];
+const BOX: [[f64; 2]; 2] = [[-0.5, 0.5], [-0.9, -0.6]];
 const FLOOR: f64 = -1.5;
 
 fn floor_and_box<const D: usize>() -> Arc<dyn RayBackend<D>> {
@@ -312,7 +312,7 @@ fn lit_floor<const D: usize>(projection: Projection) {
     let (mut shadowed, mut lit) = ([0, 0], [0, 0]);
     for n in 0..renderer.grid.len() {
         for (c, &light) in light[3 * n..3 * n + 3].iter().enumerate() {
-            assert_eq!(rgba[4 * n + c], (to_screen(light) * 255.0).round(), "{light}");
+            assert!((rgba[4 * n + c] - to_screen(light) * 255.0).abs() < 0.501, "{light}");
         }
         if object[n] != 1.0 {
             continue;
@@ -453,7 +453,7 @@ fn no_acne<const D: usize>() {
             renderer.lighting = Some(Lighting::new(vec![light], 0.0));
             let cosine = towards.normalize().dot(&turned(axis(D - 1)));
             for light in renderer.volume(&[Aov::Light], &Silent).unwrap().arrays[0].values.to_f64() {
-                assert!((light - cosine).abs() < 1e-6 + 2e-7 * offset, "{D}D, {offset}, {share}: {light} {cosine}");
+                assert!((light - cosine).abs() < 1e-6 + 1e-6 * offset, "{D}D, {offset}, {share}: {light} {cosine}");
                 lit += 1;
             }
         }
