@@ -23,7 +23,7 @@ stages:
   - occlusion: {id: loaded, input: s, load: v.f32}
   - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
   - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
-  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, camera: {projection: parallel, height: 2}}
+  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
   - render: {id: mended, occlusion: o2, dimensions: [3, 4, 5], shading: auto}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
@@ -68,6 +68,18 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("RenderSpec.tolerance", Ok("mended.tolerance=0.03")),
     ("RenderSpec.supersample", Ok("parallel.supersample=2")),
     ("RenderSpec.dilate", Ok("parallel.dilate=2")),
+    ("RenderSpec.lights", Err("its keys follow")),
+    ("LightSpec.direction", Ok("parallel.lights[0].direction=[0, -1, 0, 1]")),
+    ("LightSpec.position", Ok("parallel.lights[1].position=[0, 3, 0, 0]")),
+    ("LightSpec.color", Ok("parallel.lights[1].color=[1, 1, 0]")),
+    ("LightSpec.intensity", Ok("parallel.lights[1].intensity=3")),
+    ("RenderSpec.ambient", Ok("parallel.ambient=0.1")),
+    ("RenderSpec.specular", Ok("parallel.specular=0.2")),
+    ("RenderSpec.shininess", Ok("parallel.shininess=11")),
+    ("RenderSpec.depth_cue", Err("its keys follow")),
+    ("DepthCueSpec.near", Ok("parallel.depth_cue.near=2")),
+    ("DepthCueSpec.far", Ok("parallel.depth_cue.far=6")),
+    ("DepthCueSpec.color", Ok("parallel.depth_cue.color=0")),
     ("RenderSpec.visibility", Err("changes the time, never the image")),
     ("CameraSpec.projection", Ok("r.camera.projection=parallel")),
     ("CameraSpec.eye", Ok("r.camera.eye=[0, 0, 0, 3]")),
@@ -150,7 +162,16 @@ fn every_key_counts_or_has_a_reason() {
     };
     add("PipelineSpec", &schema);
     for (name, definition) in schema["$defs"].as_object().unwrap() {
-        let of_stage = ["SceneSpec", "OcclusionSpec", "RenderSpec", "CameraSpec", "WriteSpec", "ParaviewSpec"];
+        let of_stage = [
+            "SceneSpec",
+            "OcclusionSpec",
+            "RenderSpec",
+            "CameraSpec",
+            "WriteSpec",
+            "ParaviewSpec",
+            "LightSpec",
+            "DepthCueSpec",
+        ];
         // Of a new stage nothing is known here yet.
         let kinds = schema["$defs"]["StageSpec"].to_string();
         if of_stage.contains(&name.as_str()) || kinds.contains(&format!("#/$defs/{name}\"")) {

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64};
-use ao4d::mesh::{Mesh, Surface};
+use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
 use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
 use ao4d::render::filters::denoise::Refine;
 use ao4d::render::filters::{Dilate, denoise};
-use ao4d::render::{Aov, Camera, Projection, Renderer, Shading, Slab, View};
+use ao4d::render::tone::{to_linear, to_screen};
+use ao4d::render::{Aov, Camera, DepthCue, Light, Lighting, Projection, Renderer, Shading, Slab, Source, View};
 use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
 use ao4d::trace::{NOTHING, RayBackend, Sampling};
 use ao4d::volume::Values;
@@ -251,6 +252,221 @@ fn pictures_show_things_where_they_project_to() {
     }
 }
 
+/// One light far away and one at a point, a highlight and a depth cue.
+fn two_lights<const D: usize>() -> Lighting<D> {
+    let far = Vector64::from_fn(|r, _| [0.5, -0.25, 0.125, -1.0][if r == D - 1 { 3 } else { r }]);
+    let lights = vec![
+        Light { source: Source::Directional(far), strength: [0.6, 0.5, 0.4] },
+        Light { source: Source::Point(Vector64::from_fn(|r, _| [0.9, 0.7, -0.4, 0.5][r])), strength: [0.1, 0.3, 0.8] },
+    ];
+    let depth_cue = Some(DepthCue { near: 2.0, far: 9.0, color: [0.25, 0.5, 1.0] });
+    let mut lighting = Lighting::new(lights, 0.2);
+    (lighting.specular, lighting.shininess, lighting.depth_cue) = (0.3, 12.0, depth_cue);
+    lighting
+}
+
+/// A box floats over a floor, across the last axis; the eye is above.
+const BOX: [[f64; 2]; 2] = [[-0.5, 0.5], [-0.9, -0.6]];
+const FLOOR: f64 = -1.5;
+
+fn floor_and_box<const D: usize>() -> Arc<dyn RayBackend<D>> {
+    let mut builder = MeshBuilder::new();
+    for (name, [across, along]) in [("floor", [[-9.0, 9.0], [-2.0, FLOOR]]), ("box", BOX)] {
+        let mut surface = cube::<D>(0.0, 1.0);
+        for vertex in &mut surface.vertices {
+            for r in 0..D {
+                let [low, high]: [f64; 2] = if r == D - 1 { along } else { across };
+                vertex[r] = low + (high - low) * vertex[r];
+            }
+        }
+        builder.add_creased(name, [1.0, 0.5, 0.25], &surface, Orientation::Input, Crease::Above(30.0)).unwrap();
+    }
+    Arc::new(CpuBackend::new(Tracer::new(builder.finish())))
+}
+
+/// How far a light's ray is from the edge of the box's shadow, negative inside: by where the ray from a point of the
+/// floor enters and leaves the box's slabs.
+fn outside_shadow<const D: usize>(point: &Vector64<D>, way: &Vector64<D>) -> f64 {
+    let (mut enter, mut leave) = (0.0f64, 1.0f64);
+    for r in 0..D {
+        let [low, high] = BOX[usize::from(r == D - 1)].map(|x| (x - point[r]) / way[r]);
+        (enter, leave) = (enter.max(low.min(high)), leave.min(low.max(high)));
+    }
+    enter - leave
+}
+
+/// Lambert's cosines, highlights by half the angle, falloff, shadows and depth cues on a floor, from formulas of its own.
+fn lit_floor<const D: usize>(projection: Projection) {
+    let backend = floor_and_box::<D>();
+    let eye = View::<D>::default().eye * 3.0;
+    let camera = Camera::new(&View { eye, projection, ..View::default() }).unwrap();
+    let dimensions = if D == 4 { [23, 23, 23] } else { [120, 120, 1] };
+    let mut renderer = Renderer::new(backend, camera, dimensions, Shading::None);
+    let lighting = two_lights::<D>();
+    let (lights, cue) = (lighting.lights().to_vec(), lighting.depth_cue.unwrap());
+    renderer.lighting = Some(lighting);
+    let aovs = [Aov::Light, Aov::Position, Aov::Object, Aov::Depth, Aov::Rgba];
+    let arrays = renderer.volume(&aovs, &Silent).unwrap().arrays;
+    let [light, position, object, depth, rgba] = [0, 1, 2, 3, 4].map(|a| arrays[a].values.to_f64());
+    let reflectance = [1.0, 0.5, 0.25].map(to_linear);
+    let (mut shadowed, mut lit) = ([0, 0], [0, 0]);
+    for n in 0..renderer.grid.len() {
+        for (c, &light) in light[3 * n..3 * n + 3].iter().enumerate() {
+            assert!((rgba[4 * n + c] - to_screen(light) * 255.0).abs() < 0.501, "{light}");
+        }
+        if object[n] != 1.0 {
+            continue;
+        }
+        let point = Vector64::<D>::from_fn(|r, _| position[D * n + r]);
+        let to_eye = match projection {
+            Projection::Parallel { .. } => Vector64::from_fn(|r, _| f64::from(r == D - 1)),
+            Projection::Perspective { .. } => (eye - point).normalize(),
+        };
+        let mut sum = reflectance.map(|c| 0.2 * c);
+        let mut edge = f64::INFINITY;
+        for (l, light) in lights.iter().enumerate() {
+            // Of a light far away: as long as the way over the box.
+            let way = match light.source {
+                Source::Directional(direction) => -direction * 3.0,
+                Source::Point(place) => place - point,
+            };
+            let outside = outside_shadow(&point, &way);
+            edge = edge.min(outside.abs());
+            if outside < 0.0 {
+                shadowed[l] += 1;
+                continue;
+            }
+            lit[l] += 1;
+            let towards = way.normalize();
+            let falloff = match light.source {
+                Source::Directional(_) => 1.0,
+                Source::Point(_) if D == 3 => 1.0 / way.norm_squared(),
+                Source::Point(_) => 1.0 / way.norm_squared().powf(1.5),
+            };
+            // The halfway vector has the height of both together, over twice the cosine of half their angle.
+            let half = ((1.0 + towards.dot(&to_eye)) / 2.0).sqrt();
+            let highlight = 0.3 * ((towards[D - 1] + to_eye[D - 1]) / (2.0 * half)).powi(12);
+            for c in 0..3 {
+                sum[c] += light.strength[c] * falloff * (reflectance[c] * towards[D - 1] + highlight);
+            }
+        }
+        if edge < 1e-4 {
+            continue;
+        }
+        let left = ((cue.far - depth[n]) / (cue.far - cue.near)).clamp(0.0, 1.0);
+        for c in 0..3 {
+            let expected = sum[c] * left + cue.color[c] * (1.0 - left);
+            assert!((light[3 * n + c] - expected).abs() < 2e-6, "{D}D, {point}: {} {expected}", light[3 * n + c]);
+        }
+    }
+    assert!(shadowed.into_iter().chain(lit).min() > Some(30), "{shadowed:?} {lit:?}");
+    assert!(renderer.lighting.as_ref().unwrap().in_vain().is_empty());
+
+    // A light in the box reaches nothing, and what is seen is as without it.
+    let inside =
+        Light { source: Source::Point(Vector64::from_fn(|r, _| [0.1, -0.75][usize::from(r == D - 1)])), ..lights[0] };
+    renderer.lighting = Some(Lighting::new(vec![inside, lights[0]], 0.2));
+    let with = renderer.volume(&[Aov::Light], &Silent).unwrap();
+    assert_eq!(renderer.lighting.as_ref().unwrap().in_vain(), [0]);
+    renderer.lighting = Some(Lighting::new(vec![lights[0]], 0.2));
+    assert_eq!(renderer.volume(&[Aov::Light], &Silent).unwrap(), with);
+}
+
+#[test]
+fn lights_follow_their_formulas() {
+    for projection in [Projection::Perspective { field_of_view: 50.0 }, Projection::Parallel { height: 3.0 }] {
+        lit_floor::<3>(projection);
+        lit_floor::<4>(projection);
+    }
+}
+
+/// A supersampled voxel has the mean light of the voxels of the finer picture, shadows' edges included, and what is mixed is
+/// light, not what a screen shows of it.
+fn mean_light<const D: usize>() {
+    let backend = floor_and_box::<D>();
+    let projection = Projection::Parallel { height: 3.0 };
+    let camera = Camera::new(&View { eye: View::<D>::default().eye * 3.0, projection, ..View::default() }).unwrap();
+    let dimensions = if D == 4 { [8, 8, 8] } else { [31, 31, 1] };
+    let picture = |dimensions: [usize; 3], supersample: usize| {
+        let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, Shading::None);
+        (renderer.supersample, renderer.lighting) = (supersample, Some(two_lights()));
+        renderer.volume(&[Aov::Light, Aov::Rgba], &Silent).unwrap()
+    };
+    let fine = picture(std::array::from_fn(|a| dimensions[a] * if a < D - 1 { 3 } else { 1 }), 1);
+    let coarse = picture(dimensions, 3);
+    let [of_fine, of_coarse] = [&fine, &coarse].map(|volume| volume.arrays[0].values.to_f64());
+    let shown = coarse.arrays[1].values.to_f64();
+    let mut sums = vec![[0.0f64; 3]; coarse.grid.len()];
+    for n in 0..fine.grid.len() {
+        let index = fine.grid.index(n);
+        let [i, j, k]: [usize; 3] = std::array::from_fn(|a| index[a] * dimensions[a] / fine.grid.dimensions[a]);
+        (0..3).for_each(|c| sums[i + dimensions[0] * (j + dimensions[1] * k)][c] += of_fine[3 * n + c]);
+    }
+    for (n, sum) in sums.into_iter().enumerate() {
+        for (c, sum) in sum.into_iter().enumerate() {
+            let expected = sum / 3f64.powi(D as i32 - 1);
+            assert!((of_coarse[3 * n + c] - expected).abs() < 2e-6, "{D}D: {} {expected}", of_coarse[3 * n + c]);
+            assert!((shown[4 * n + c] - to_screen(expected) * 255.0).abs() < 0.501);
+        }
+    }
+}
+
+#[test]
+fn light_is_averaged_before_the_tone_curve() {
+    mean_light::<3>();
+    mean_light::<4>();
+}
+
+/// A convex body throws no shadow onto itself, even where voxels see the very edges between its coplanar simplices, and
+/// points are rounded.
+fn no_acne<const D: usize>() {
+    let mut lit = 0;
+    for (step, offset) in [0.0, 0.3, 7.7, 1234.5].into_iter().enumerate() {
+        let turned = |v: Vector64<D>| {
+            let mut v = v;
+            for axis in 0..D - 1 {
+                let (sin, cos) = (0.3 + 0.4 * (step + axis) as f64).sin_cos();
+                (v[axis], v[D - 1]) = (cos * v[axis] - sin * v[D - 1], sin * v[axis] + cos * v[D - 1]);
+            }
+            v
+        };
+        let centre = Vector64::<D>::repeat(offset);
+        let mut surface = cube::<D>(-0.7, 0.7);
+        surface.vertices.iter_mut().for_each(|v| *v = turned(*v) + centre);
+        let mut builder = MeshBuilder::new();
+        builder.add_creased("cube", [1.0; 3], &surface, Orientation::Input, Crease::Above(30.0)).unwrap();
+        let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(builder.finish())));
+        let axis = |a: usize| Vector64::from_fn(|r, _| f64::from(r == a));
+        let camera = Camera::new(&View {
+            projection: Projection::Parallel { height: 1.3 },
+            eye: turned(axis(D - 1) * 3.0) + centre,
+            target: centre,
+            up: turned(axis(1)),
+            over: turned(axis(2)),
+        })
+        .unwrap();
+        let dimensions = if D == 4 { [21, 21, 21] } else { [101, 101, 1] };
+        let mut renderer = Renderer::new(backend, camera, dimensions, Shading::None);
+        for share in [0.01, 0.3, 4.0] {
+            let towards = turned(Vector64::from_fn(|r, _| [0.8, -0.5, 0.3, share][if r == D - 1 { 3 } else { r }]));
+            let light = Light { source: Source::Directional(-towards), strength: [1.0; 3] };
+            renderer.lighting = Some(Lighting::new(vec![light], 0.0));
+            let cosine = towards.normalize().dot(&turned(axis(D - 1)));
+            for light in renderer.volume(&[Aov::Light], &Silent).unwrap().arrays[0].values.to_f64() {
+                assert!((light - cosine).abs() < 1e-6 + 1e-6 * offset, "{D}D, {offset}, {share}: {light} {cosine}");
+                lit += 1;
+            }
+        }
+    }
+    assert!(lit > 10_000);
+}
+
+#[test]
+fn convex_bodies_throw_no_shadow_onto_themselves() {
+    no_acne::<3>();
+    no_acne::<4>();
+}
+
 /// A picture is the same bytes however thick its slabs are, and on however many threads it is made.
 fn slabs<const D: usize>() {
     let mut random = Random(3);
@@ -272,6 +488,10 @@ fn slabs<const D: usize>() {
         for supersample in [1, 2, 3] {
             let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading.clone());
             renderer.supersample = supersample;
+            // Every other picture is lit.
+            if supersample == 2 {
+                renderer.lighting = Some(two_lights());
+            }
             if filtered {
                 renderer.filters.extend(denoise(&camera, &renderer.grid, Sampling::new(16, 1)));
                 renderer.filters.push(Box::new(Refine::new(Arc::clone(&backend), Sampling::new(64, 1), 0.02)));

@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::gbuffer::{Columns, GBuffer};
+use super::tone::to_screen;
 use crate::volume::{Array, Kind, Values};
 
 /// Components of an array that has as many as the scene has dimensions.
@@ -68,7 +69,8 @@ macro_rules! aovs {
 }
 
 aovs! {
-    /// Colour times ambient occlusion, and opacity, 4 x uint8: what volume rendering shows directly.
+    /// Colour times ambient occlusion, or of a lit picture its light as a screen shows it, and opacity, 4 x uint8: what
+    /// volume rendering shows directly.
     Rgba "rgba": U8 x 4, "", [ALBEDO OCCLUSION COVERAGE] |g, i| {
         let [red, green, blue] = color(g, i);
         [byte(red), byte(green), byte(blue), byte(g.coverage[i])]
@@ -77,7 +79,7 @@ aovs! {
     AmbientOcclusion "ambient_occlusion": F32 x 1, "", [OCCLUSION] |g, i| [g.occlusion[i]];
     /// 1 where something is seen, 0 elsewhere; a fraction where voxels are supersampled.
     Opacity "opacity": F32 x 1, "", [COVERAGE] |g, i| [g.coverage[i]];
-    /// Colour times ambient occlusion over white, 3 x float32; white where nothing is.
+    /// The same colours over white, 3 x float32; white where nothing is.
     Rgb "rgb": F32 x 3, "", [ALBEDO OCCLUSION COVERAGE] |g, i| {
         let coverage = g.coverage[i];
         color(g, i).map(|c| c * coverage + (1.0 - coverage))
@@ -100,18 +102,37 @@ aovs! {
     OcclusionError "occlusion_error": F32 x 1, "", [ERROR] |g, i| [g.error[i]];
     /// The part of the voxel that sees something, 0 to 1.
     Coverage "coverage": F32 x 1, "", [COVERAGE] |g, i| [g.coverage[i]];
+    /// The light that reaches the eye, linear RGB without bound, 3 x float32; white where nothing is. Of lit pictures.
+    Light "light": F32 x 3, "", [ALBEDO OCCLUSION] |g, i| light(g, i);
 }
 
 impl Aov {
+    /// Whether it shows how a picture is lit.
+    pub fn is_lit(self) -> bool {
+        self.columns().contains(Columns::ALBEDO)
+    }
+
     /// Bytes a voxel.
     pub fn bytes<const D: usize>(self) -> usize {
         self.kind().size() * self.components::<D>()
     }
 }
 
-/// Colour times occlusion.
+/// Colour times occlusion; of a lit picture what the tone curve makes of its light.
 fn color<const D: usize>(buffer: &GBuffer<D>, i: usize) -> [f32; 3] {
-    buffer.albedo[i].map(|c| (c * buffer.occlusion[i]).clamp(0.0, 1.0))
+    let light = light(buffer, i);
+    if buffer.columns().contains(Columns::DIRECT) {
+        light.map(|c| to_screen(f64::from(c)) as f32)
+    } else {
+        light.map(|c| c.clamp(0.0, 1.0))
+    }
+}
+
+/// What reaches the eye: ambient light, as far as it is not occluded, and that of lights.
+fn light<const D: usize>(buffer: &GBuffer<D>, i: usize) -> [f32; 3] {
+    let (albedo, occlusion) = (buffer.albedo[i], buffer.occlusion[i]);
+    let direct = buffer.direct.get(i).copied().unwrap_or_default();
+    std::array::from_fn(|c| (albedo[c] * occlusion + direct[c]).min(f32::MAX))
 }
 
 /// A number from 0 to 1 as a byte: to the nearest, exactly, as adding a half loses nothing in f64.

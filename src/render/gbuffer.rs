@@ -2,8 +2,8 @@
 //!
 //! A voxel shows at most one surface point: what the ray through its centre hits first, or, where voxels are
 //! supersampled and the centre sees nothing, the sample nearest to the centre that sees something. Its simplex,
-//! position, normals and object are those of that point; coverage, depth, albedo and occlusion are means over the
-//! samples of the voxel that see something.
+//! position, normals and object are those of that point; coverage, depth, albedo, direct light and occlusion are means over
+//! the samples of the voxel that see something.
 //!
 //! Only columns that some output or filter asks for are held; the others are empty. The list below is the only place
 //! that names them: a new quantity is one row here, and a line where it is computed.
@@ -111,9 +111,13 @@ columns! {
     shading_normal SHADING_NORMAL: Vector<D> = Vector::zeros();
     /// The object's number from 1; 0 where nothing is.
     object OBJECT: u16 = 0;
-    /// The object's colour, linear RGB; where a voxel shows several, their mean weighted by occlusion, so that colour
-    /// times occlusion is the mean of the products. White where nothing is.
+    /// What of open ambient light the voxel sends to the eye: the object's colour, or, where lights are, linear light. Where
+    /// a voxel shows several, their mean weighted by occlusion, so that this times occlusion is the mean of the products.
+    /// White where nothing is.
     albedo ALBEDO: [f32; 3] = [1.0; 3];
+    /// What else it sends to the eye, linear RGB: the light of lights, and of depth cues. Only lit pictures have it; black
+    /// where nothing is.
+    direct DIRECT: [f32; 3] = [0.0; 3];
     /// Ambient occlusion, 1 is open; 1 where nothing is.
     occlusion OCCLUSION: f32 = 1.0;
     /// Ambient occlusion interpolated between the simplex's vertices, where the occlusion itself is found otherwise; 1

@@ -4,7 +4,8 @@
 //! picture is made slab by slab (some layers of z), in five steps:
 //!
 //! 1. [`visibility`]: the simplex that the ray through each voxel's centre, or through each of its samples, hits first;
-//! 2. `surface`: the point that a voxel shows, into the columns of the [`GBuffer`] that somebody asked for;
+//! 2. `surface`: the point that a voxel shows, and how [`Lighting`] lights it, into the columns of the [`GBuffer`] that
+//!    somebody asked for;
 //! 3. `occlude`: ambient occlusion at those points, where it does not come from the vertices;
 //! 4. [`filters`]: what looks at neighbouring voxels;
 //! 5. [`Aov`]: the columns as the numbers of an array, for each array that somebody asked for.
@@ -14,17 +15,20 @@ mod audit;
 mod camera;
 pub mod filters;
 pub mod gbuffer;
+mod light;
 mod occlude;
 mod renderer;
 mod samples;
 mod shading;
 mod surface;
+pub mod tone;
 pub mod visibility;
 
 pub use aov::Aov;
 pub use audit::Accuracy;
 pub use camera::{Camera, CameraError, Projection, View};
 pub use gbuffer::{Columns, GBuffer};
+pub use light::{DepthCue, Light, Lighting, Source};
 pub use renderer::{Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
 pub use shading::Shading;

@@ -8,7 +8,7 @@ use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
 use super::samples::Sampling;
 use super::surface::SurfacePass;
-use super::{Accuracy, Aov, Camera, NOTHING, Shading, Visibility, occlude, visibility};
+use super::{Accuracy, Aov, Camera, Lighting, NOTHING, Shading, Visibility, occlude, visibility};
 use crate::accel::Tracer;
 use crate::occlusion::Error;
 use crate::progress::Progress;
@@ -29,6 +29,8 @@ pub struct Renderer<const D: usize> {
     pub grid: Grid,
     /// Where their ambient occlusion comes from.
     pub shading: Shading,
+    /// How it is lit; none shows colour times ambient occlusion.
+    pub lighting: Option<Lighting<D>>,
     /// How it is found out what voxels see; changes the time only.
     pub visibility: visibility::Method,
     /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
@@ -57,7 +59,8 @@ impl<const D: usize> Renderer<D> {
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
-        Self { backend, camera, grid, shading, visibility, supersample: 1, filters: Vec::new(), audit: None }
+        let filters = Vec::new();
+        Self { backend, camera, grid, shading, lighting: None, visibility, supersample: 1, filters, audit: None }
     }
 
     /// The scene.
@@ -90,7 +93,11 @@ impl<const D: usize> Renderer<D> {
             sampling: &sampling,
             visibility: &visibility,
             shading: &self.shading,
+            lighting: self.lighting.as_ref(),
         };
+        if columns.contains(Columns::DIRECT) {
+            self.tracer().prepare();
+        }
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
             let mut buffer = pass.layers(layers, columns, progress)?;
             match self.shading {
@@ -135,9 +142,11 @@ impl<const D: usize> Renderer<D> {
     /// The columns that arrays and filters need.
     fn columns(&self, aovs: &[Aov]) -> Columns {
         let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
-        columns(&self.shading, aovs)
+        let columns = columns(&self.shading, aovs)
             | audited
-            | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns())
+            | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns());
+        let is_lit = self.lighting.is_some() && columns.contains(Columns::ALBEDO);
+        if is_lit { columns | Columns::DIRECT } else { columns }
     }
 
     /// Layers of a slab whose working set stays below `bytes`; at least one.

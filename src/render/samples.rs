@@ -106,6 +106,18 @@ impl Sampling {
         self.by_distance.iter().map(|&n| (n, samples[self.offsets[n]])).find(|&(_, simplex)| simplex != NOTHING)
     }
 
+    /// The samples of voxel (i, j) of the `layer`-th layer that see this simplex.
+    pub fn of_simplex<'f>(
+        &'f self,
+        found: &'f [u32],
+        [i, j, layer]: [usize; 3],
+        simplex: u32,
+    ) -> impl Iterator<Item = usize> + 'f {
+        let ([x, y, z], [width, height, _]) = (self.per_axis, self.fine.dimensions);
+        let samples = &found[i * x + width * (j * y + height * layer * z)..];
+        (0..self.offsets.len()).filter(move |&n| samples[self.offsets[n]] == simplex)
+    }
+
     /// The ray of a sample of a voxel (i, j, k) of the image.
     pub fn ray<const D: usize>(&self, camera: &Camera<D>, index: [usize; 3], n: usize) -> Ray<D> {
         let place = self.place(n);

@@ -11,6 +11,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::gbuffer::{Columns, GBuffer, RowMut};
+use super::light::{Lighting, Lit, reflectance};
 use super::samples::{Group, Sampling};
 use super::{Camera, Shading, Visibility};
 use crate::accel::Tracer;
@@ -26,6 +27,7 @@ pub(super) struct SurfacePass<'r, const D: usize> {
     pub sampling: &'r Sampling,
     pub visibility: &'r Visibility<D>,
     pub shading: &'r Shading,
+    pub lighting: Option<&'r Lighting<D>>,
 }
 
 /// Where a ray meets a simplex.
@@ -79,7 +81,12 @@ impl<const D: usize> SurfacePass<'_, D> {
             let mut scratch = Scratch { groups: Vec::new(), cone: None };
             for i in 0..width {
                 if let Some((sample, simplex)) = self.sampling.groups(&found, [i, j, layer], &mut scratch.groups) {
-                    self.voxel([i, j, layers.start + layer], sample, simplex, &mut scratch, out);
+                    let index = [i, j, layers.start + layer];
+                    self.voxel(index, sample, simplex, &mut scratch, out);
+                    if let (Some(lighting), false) = (self.lighting, out.direct.is_empty()) {
+                        let samples = |simplex: u32| self.sampling.of_simplex(&found, [i, j, layer], simplex);
+                        out.direct[i] = self.direct(lighting, index, samples, &mut scratch);
+                    }
                 }
             }
             progress.advance(width as u64);
@@ -131,12 +138,67 @@ impl<const D: usize> SurfacePass<'_, D> {
             means.depth += weight * hit.depth();
             means.occlusion += weight * occlusion;
             means.error += weight * f64::from(error);
-            for (c, color) in mesh.objects[mesh.object_of(group.simplex)].color.into_iter().enumerate() {
-                means.albedo[c] += weight * f64::from(color);
-                means.lit[c] += weight * f64::from(color) * occlusion;
+            let color = mesh.objects[mesh.object_of(group.simplex)].color;
+            let ambient = match self.lighting {
+                None => color.map(f64::from),
+                Some(lighting) => reflectance(color).map(|c| c * lighting.ambient * lighting.cue(hit.depth()).0),
+            };
+            for (c, color) in ambient.into_iter().enumerate() {
+                means.albedo[c] += weight * color;
+                means.lit[c] += weight * color * occlusion;
             }
         }
         means
+    }
+
+    /// The mean over a voxel's samples of what lights and depth cues send to the eye. Each sample looks for itself, as
+    /// a shadow may end between them.
+    fn direct<I: Iterator<Item = usize>>(
+        &self,
+        lighting: &Lighting<D>,
+        index: [usize; 3],
+        samples: impl Fn(u32) -> I,
+        scratch: &mut Scratch<D>,
+    ) -> [f32; 3] {
+        let mesh = self.tracer.mesh();
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
+        for g in 0..scratch.groups.len() {
+            let simplex = scratch.groups[g].simplex;
+            let reflectance = reflectance(mesh.objects[mesh.object_of(simplex)].color);
+            for sample in samples(simplex) {
+                let ray = self.sampling.ray(self.camera, index, sample);
+                let crossing = scratch.cone(self.tracer, simplex, &ray.origin).crossing(&ray.direction);
+                let hit = Hit { simplex, ray, crossing };
+                let light = lighting.direct(self.tracer, &self.lit(&hit, reflectance));
+                let (left, cue) = lighting.cue(hit.depth());
+                (0..3).for_each(|c| sum[c] += light[c] * left + cue[c]);
+                count += 1.0;
+            }
+        }
+        sum.map(|c: f64| (c / count).min(f64::from(f32::MAX)) as f32)
+    }
+
+    /// What lights ask of a point.
+    fn lit(&self, hit: &Hit<D>, reflectance: [f64; 3]) -> Lit<D> {
+        let mesh = self.tracer.mesh();
+        let corners = mesh.corners(hit.simplex).map(|v| widen(&v));
+        let (vertices, weights) = (mesh.simplices[hit.simplex as usize], hit.crossing.barycentric);
+        let facing = widen(&facing(normal_of(&corners), &hit.ray));
+        let interpolated = match self.shading {
+            Shading::Flat(_) => Vector64::zeros(),
+            _ => (0..D).fold(Vector64::zeros(), |n, c| n + widen(&mesh.normals[vertices[c] as usize]) * weights[c]),
+        };
+        // On the side of the simplex's own, even where it has turned away from the eye already.
+        let interpolated = widen(&unit(&interpolated));
+        let side = interpolated.dot(&facing);
+        Lit {
+            simplex: hit.simplex,
+            point: (0..D).fold(Vector64::zeros(), |p, c| p + corners[c] * weights[c]),
+            facing,
+            normal: if side == 0.0 { facing } else { interpolated * side.signum() },
+            to_eye: widen(&unit(&-widen(&hit.ray.direction))),
+            reflectance,
+        }
     }
 
     /// Occlusion and its standard error by the values at the simplex's vertices; open where there are none.

@@ -179,7 +179,7 @@ pub fn camera<const D: usize>(plan: &CameraPlan) -> Result<Camera<D>, CameraErro
 }
 
 /// A vector of the right length, with numbers of a sane size.
-fn check_vector(path: &str, vector: &[f64], dimension: usize) -> Result<Vec<f64>, Invalid> {
+pub(super) fn check_vector(path: &str, vector: &[f64], dimension: usize) -> Result<Vec<f64>, Invalid> {
     if vector.len() != dimension {
         let message = format!("expected {dimension} numbers (the scene is {dimension}D), found {}", vector.len());
         return Err(Invalid::new(path, message));

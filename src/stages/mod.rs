@@ -24,6 +24,7 @@ pub mod cut;
 pub mod describe;
 mod error;
 pub mod key;
+pub mod lighting;
 pub mod mesh;
 mod names;
 pub mod occlusion;

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
+use super::lighting::{self, DepthCueSpec, LightSpec, LightingKeys, LightingPlan};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::scene::{MISSING, ScenePlan};
 use super::write::{Content, PictureFiles, WritePlan};
@@ -68,6 +69,21 @@ pub struct RenderSpec {
     /// renderings mix in nothing else; opacity tells what is real (default 3 in 4D, 0 in 3D).
     #[schemars(range(min = 0, max = 16))]
     pub dilate: Option<u64>,
+    /// Lights that throw shadows. With `lights`, `ambient` or `depth_cue` an image is lit: all light is added up in linear
+    /// numbers, `light` holds the sum, and the colours that are shown are what sRGB makes of it, white from 1 on. Without, it
+    /// shows colour times occlusion.
+    pub lights: Option<Vec<LightSpec>>,
+    /// The light that comes from all sides, darkened by the occlusion (default 0.3 beside `lights`, 1 without).
+    #[schemars(range(min = 0, max = 1_000_000))]
+    pub ambient: Option<f64>,
+    /// The share of the lights that surfaces reflect in highlights (default 0).
+    #[schemars(range(min = 0, max = 1))]
+    pub specular: Option<f64>,
+    /// The exponent of highlights: the higher, the smaller they are (default 30).
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub shininess: Option<f64>,
+    /// What is far from the eye takes on a colour.
+    pub depth_cue: Option<DepthCueSpec>,
     /// How it is found out what voxels see; changes the time, never the image (default `auto`, the faster one).
     pub visibility: Option<Visibility>,
 }
@@ -109,10 +125,25 @@ pub struct RenderPlan {
     pub supersample: usize,
     /// Layers of empty voxels that take over bodies' values.
     pub dilate: usize,
+    /// How it is lit; none shows colour times occlusion.
+    pub lighting: Option<LightingPlan>,
     /// How it is found out what voxels see.
     pub visibility: Visibility,
     /// The arrays that its files need, in their own order, each once.
     pub arrays: Vec<Aov>,
+}
+
+impl RenderSpec {
+    /// What it says of lights.
+    pub(super) fn lighting_keys(&self) -> LightingKeys<'_> {
+        LightingKeys {
+            lights: self.lights.as_deref(),
+            ambient: self.ambient,
+            specular: self.specular,
+            shininess: self.shininess,
+            depth_cue: self.depth_cue.as_ref(),
+        }
+    }
 }
 
 impl RenderPlan {
@@ -194,6 +225,7 @@ impl Stage for RenderPlan {
         }
         let layers = if dimension == Dimension::Four { 3 } else { 0 };
         let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
+        let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
         let arrays = Vec::new();
         let tolerance = (shading == Shading::Auto && denoise).then_some(tolerance);
         Ok(Self {
@@ -206,6 +238,7 @@ impl Stage for RenderPlan {
             tolerance,
             supersample,
             dilate,
+            lighting,
             visibility,
             arrays,
         })
@@ -232,6 +265,9 @@ impl Stage for RenderPlan {
             "supersample": render.supersample,
             "dilate": render.dilate,
         });
+        if let (Some(lighting), Some(written)) = (&render.lighting, written.as_object_mut()) {
+            written.extend(lighting.written());
+        }
         // Elsewhere it has no effect, and would be warned of.
         if rays_of(plan, render).is_some() {
             written["denoise"] = render.denoise.into();
@@ -253,6 +289,9 @@ impl Stage for RenderPlan {
         let dimension = plan[render.scene].dimension;
         let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
         let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
+        if render.lighting.is_some() {
+            columns |= Columns::DIRECT;
+        }
         let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
         if render.denoise {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
@@ -302,6 +341,7 @@ impl Stage for RenderPlan {
         let shading = shading(plan, render, scene);
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
+        picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
         picture.filters = filters(plan, render, &picture);
         picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
         let start = Instant::now();
@@ -323,6 +363,9 @@ impl Stage for RenderPlan {
         let rendering = start.elapsed();
         let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
         let mut notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
+        if let Some(lighting) = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit())) {
+            notes.extend(lighting::in_vain(lighting, plan.id(me)));
+        }
         if behind > 0 && picture.shading.is_interpolated() {
             notes.push(format!(
                 "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \

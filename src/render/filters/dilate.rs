@@ -26,6 +26,8 @@ struct Value {
     /// How much it counts: coverage, or 1 where it was filled; 0 where there is nothing yet.
     weight: f32,
     albedo: [f32; 3],
+    /// Black where the picture is not lit.
+    direct: [f32; 3],
     occlusion: f32,
 }
 
@@ -47,13 +49,17 @@ fn step(values: &[Value], dimensions: [usize; 3]) -> Vec<Value> {
                 let weight = value.weight / distance as f32;
                 total += weight;
                 sum.occlusion += weight * value.occlusion;
-                (0..3).for_each(|c| sum.albedo[c] += weight * value.albedo[c]);
+                for c in 0..3 {
+                    sum.albedo[c] += weight * value.albedo[c];
+                    sum.direct[c] += weight * value.direct[c];
+                }
             }
         }
         if total == 0.0 {
             return Value::default();
         }
-        Value { weight: 1.0, albedo: sum.albedo.map(|c| c / total), occlusion: sum.occlusion / total }
+        let [albedo, direct] = [sum.albedo, sum.direct].map(|sum| sum.map(|c| c / total));
+        Value { weight: 1.0, albedo, direct, occlusion: sum.occlusion / total }
     };
     let next = values.par_iter().enumerate().with_min_len(1024);
     next.map(|(n, value)| if value.weight > 0.0 { *value } else { filled(n) }).collect()
@@ -73,7 +79,8 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         // spoils moves inwards by a layer a step, and so stays within the halo.
         let value = |i: usize| {
             let (weight, albedo, occlusion) = (input.coverage[i], input.albedo[i], input.occlusion[i]);
-            Value { weight, albedo, occlusion }
+            let direct = input.direct.get(i).copied().unwrap_or_default();
+            Value { weight, albedo, direct, occlusion }
         };
         let mut values: Vec<Value> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
         for _ in 0..self.layers {
@@ -86,6 +93,9 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         for (i, value) in values[range].iter().enumerate() {
             if out.coverage[i] == 0.0 && value.weight > 0.0 {
                 (out.albedo[i], out.occlusion[i]) = (value.albedo, value.occlusion);
+                if let Some(direct) = out.direct.get_mut(i) {
+                    *direct = value.direct;
+                }
             }
         }
         Ok(())

@@ -305,6 +305,7 @@ const MESH_LEFT_OUT: &[LeftOut] = &[
     LeftOut::new("/tolerance", "a mesh has no voxels"),
     LeftOut::new("/supersample", "a mesh has no voxels"),
     LeftOut::new("/dilate", "a mesh has no voxels"),
+    LeftOut::new("/lighting", "a mesh is not lit"),
 ];
 
 impl Stage for WritePlan {
@@ -346,6 +347,11 @@ impl Stage for WritePlan {
         for (i, array) in arrays.iter().enumerate() {
             if arrays[..i].contains(array) {
                 return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.name())));
+            }
+            if *array == Aov::Light && resolver.plan[render].lighting.is_none() {
+                let id = resolver.plan.id(render);
+                let message = format!("render `{id}` is not lit; give it `lights`, `ambient` or `depth_cue`");
+                return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
             }
         }
         if files.get(Format::Vti).is_none() {
