@@ -42,12 +42,11 @@ impl Copies {
         if several().next().is_none() {
             return copies;
         }
-        let is_balanced = |place: &[([u32; D], u32)]| {
-            2 * place.iter().filter(|(_, s)| is_odd(corners[*s as usize])).count() == place.len()
-        };
-        let balanced: HashSet<u32> = several().filter(|p| is_balanced(p)).flatten().map(|&(_, s)| s).collect();
-        let bodies = if balanced.is_empty() { Vec::new() } else { bodies(corners, &balanced) };
-        let is_flap = |s: u32| balanced.contains(&s) && bodies[s as usize];
+        let odd = |place: &[([u32; D], u32)]| place.iter().filter(|(_, s)| is_odd(corners[*s as usize])).count();
+        let are_opposed = |place: &&[([u32; D], u32)]| (1..place.len()).contains(&odd(place));
+        let opposed: HashSet<u32> = several().filter(are_opposed).flatten().map(|&(_, s)| s).collect();
+        let bodies = if opposed.is_empty() { Vec::new() } else { bodies(corners, &opposed) };
+        let is_flap = |s: u32| opposed.contains(&s) && bodies[s as usize];
         for place in several().filter(|place| !is_flap(place[0].1)) {
             let first = place[0].1;
             copies.firsts.extend(place[1..].iter().map(|&(_, s)| [s, first]));
@@ -96,8 +95,8 @@ impl Copies {
 }
 
 /// Whether each simplex belongs to a closed body: to simplices connected by facets, of which every facet is used as often
-/// in one direction as in the other, and not only because all simplices are `balanced`, as a sheet's two sides are.
-fn bodies<const D: usize>(corners: &[[u32; D]], balanced: &HashSet<u32>) -> Vec<bool> {
+/// in one direction as in the other, and not only because all simplices are `opposed` to others in their place, as a sheet's two sides are.
+fn bodies<const D: usize>(corners: &[[u32; D]], opposed: &HashSet<u32>) -> Vec<bool> {
     let count = corners.len();
     let mut sets = UnionFind::new(count);
     let facets = sorted_facets(corners);
@@ -107,7 +106,7 @@ fn bodies<const D: usize>(corners: &[[u32; D]], balanced: &HashSet<u32>) -> Vec<
     for facet in around().filter(|facet| 2 * facet.iter().filter(|f| f.turned).count() != facet.len()) {
         closed[sets.root(facet[0].simplex) as usize] = false;
     }
-    for s in (0..count as u32).filter(|s| !balanced.contains(s)) {
+    for s in (0..count as u32).filter(|s| !opposed.contains(s)) {
         solid[sets.root(s) as usize] = true;
     }
     (0..count as u32)

@@ -40,7 +40,7 @@ impl<const D: usize> Hyperplane<D> {
     pub fn new(normal: Vector64<D>, at: f64) -> Option<Self> {
         let normal = normal.map(|x| if x.abs() < SMALLEST { 0.0 } else { x });
         let largest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        if !(largest > 0.0 && largest.is_finite() && at.is_finite()) {
+        if !(largest > 0.0 && normal.iter().all(|x| x.is_finite()) && at.is_finite()) {
             return None;
         }
         let unit = (normal / largest).normalize();

@@ -7,8 +7,11 @@
 
 /// The part of linear light that a screen is to show, 0 to 1: sRGB, clipped at white.
 pub fn to_screen(light: f64) -> f64 {
-    let light = light.clamp(0.0, 1.0);
-    if light <= 0.003_130_8 { 12.92 * light } else { (1.055 * libm::pow(light, 1.0 / 2.4) - 0.055).min(1.0) }
+    match light.max(0.0) {
+        white if white >= 1.0 => 1.0,
+        dark if dark <= 0.003_130_8 => 12.92 * dark,
+        light => 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055,
+    }
 }
 
 /// The linear light of a number from 0 to 1 that a screen is sent.

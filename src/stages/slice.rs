@@ -237,8 +237,8 @@ fn places(spec: &SliceSpec, path: &str) -> Result<Vec<f64>, Invalid> {
                 return Err(Invalid::new(format!("{path}.range"), message));
             }
             let steps = (count - 1) as f64;
-            let share = |i: u64| i as f64 / steps;
-            Ok((0..count).map(|i| first * (1.0 - share(i)) + last * share(i)).collect())
+            let at = |i: u64| if i == count - 1 { last } else { first + (last - first) * i as f64 / steps };
+            Ok((0..count).map(at).collect())
         }
         (Some(_), _, _) => {
             let message = "`at` is for one slice, `range` and `count` for several; take one of them out";

@@ -44,7 +44,14 @@ impl<'de> Decoder<'de> {
                 Err(Problem::new("expected a finite number, found an infinite one or not a number (NaN)"))
             }
             Value::Text(text) => visitor.visit_borrowed_str(text),
-            Value::List(items) => visitor.visit_seq(Items { items: items.iter(), next: 0 }),
+            Value::List(items) => {
+                let mut entries = Items { items: items.iter(), next: 0 };
+                let value = visitor.visit_seq(&mut entries)?;
+                match entries.items.next() {
+                    None => Ok(value),
+                    Some(_) => Err(Problem::new(format!("expected {} entries, found {}", entries.next, items.len()))),
+                }
+            }
             Value::Map(entries) => visitor.visit_map(Entries { entries: entries.iter(), current: None }),
         }
     }
