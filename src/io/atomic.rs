@@ -47,7 +47,6 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 }
 
 /// Files that get their final names while this is held do so all, or none of them.
-#[must_use]
 pub fn together() -> RwLockReadGuard<'static, ()> {
     TOGETHER.read().unwrap_or_else(PoisonError::into_inner)
 }

@@ -58,7 +58,7 @@ pub fn write(
     file.points(points)?;
     file.text("</Points>\n")?;
     let element = if size == 2 { "Lines" } else { "Polys" };
-    write!(file.sink, "<{element}>\n")?;
+    writeln!(file.sink, "<{element}>")?;
     file.cells(flat, size)?;
     write!(file.sink, "</{element}>\n</Piece>\n</PolyData>\n</VTKFile>\n")?;
     Ok(file.sink.flush()?)

@@ -268,10 +268,8 @@ impl Section {
         for &point in self.faces.as_flattened().iter().filter(|&&point| point != u32::MAX) {
             numbers[point as usize] = 0;
         }
-        let mut next = 0;
-        for number in numbers.iter_mut().filter(|number| **number == 0) {
+        for (next, number) in (0..).zip(numbers.iter_mut().filter(|number| **number == 0)) {
             *number = next;
-            next += 1;
         }
         let mut at = 0;
         self.points.retain(|_| {

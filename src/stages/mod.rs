@@ -188,6 +188,8 @@ macro_rules! stages {
         /// One stage: its kind, and its settings.
         #[derive(Clone, Debug, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
+        // A pipeline has a handful of them: what boxes would save is nothing.
+        #[allow(clippy::large_enum_variant)]
         pub enum StageSpec {
             $($(#[$doc])+ $name($spec),)+
         }
