@@ -76,6 +76,7 @@ const KNOWN_CIRCLES: &[&[&str]] = &[
         "stages/render.rs",
         "stages/run.rs",
         "stages/scene.rs",
+        "stages/subject.rs",
         "stages/write/mod.rs",
         "stages/write/files.rs",
     ],

@@ -11,6 +11,7 @@ use ao4d::pipeline::{Pipeline, Report, Settings, run};
 use ao4d::progress::Silent;
 use ao4d::stages::occlusion::OcclusionSource;
 use ao4d::stages::paraview::FigurePlan;
+use ao4d::stages::render::Shading;
 use ao4d::stages::write::{Format, WritePlan};
 
 fn run_into(path: &Path, out: &Path, overrides: &[&str]) -> Report {
@@ -18,6 +19,13 @@ fn run_into(path: &Path, out: &Path, overrides: &[&str]) -> Report {
     let pipeline = Pipeline::load(path, &overrides, Some(out.to_owned())).unwrap();
     assert_eq!(pipeline.warnings().count(), 0);
     run(&pipeline, &Settings::default(), &Silent).unwrap()
+}
+
+/// A number of this name in the field data of a `.vti`.
+fn number(file: &Path, name: &str) -> f64 {
+    let text = String::from_utf8_lossy(&std::fs::read(file).unwrap()).into_owned();
+    let told = text.split(&format!("Name=\"{name}\"")).nth(1).unwrap();
+    told.split(['>', '<']).nth(1).unwrap().trim().parse().unwrap()
 }
 
 #[test]
@@ -43,18 +51,37 @@ fn every_pipeline_leaves_what_it_promises() {
                 let opacity = image.array("opacity").unwrap().values.to_f64();
                 let seen = opacity.iter().filter(|&&o| o == 1.0).count();
                 assert!(seen * 200 > voxels && seen < voxels, "{}: {seen} of {voxels}", path.display());
-                let mut greys = image.array("ambient_occlusion").unwrap().values.to_f64();
+                let values = image.array("ambient_occlusion").unwrap().values.to_f64();
+                let mut greys: Vec<f64> =
+                    values.into_iter().zip(&opacity).filter(|(_, o)| **o == 1.0).map(|(a, _)| a).collect();
                 greys.sort_by(f64::total_cmp);
                 greys.dedup();
                 let published = render.occlusion.is_some_and(|o| match &pipeline.plan[o].source {
                     OcclusionSource::Compute(computation) => computation.method.is_of_the_thesis(),
                     OcclusionSource::Load(_) => false,
                 });
-                // On the coordinates of the thesis's program two tetrahedra stand so far apart that hardly anything is hidden.
+                // On the coordinates of the thesis's program two tetrahedra stand so far apart that hardly anything is hidden;
+                // the program has one of them dark and the other open.
                 let apart = ["fig_5_1.yaml", "fig_5_2.yaml"].iter().any(|name| path.ends_with(name));
-                let enough = if published { 2 } else { 1 + 2 * usize::from(render.occlusion.is_some()) };
-                let right = apart || greys.len() >= enough && (greys.len() == 1) == render.occlusion.is_none();
-                assert!(right, "{}: {} greys", path.display(), greys.len());
+                let right = match (render.occlusion.is_some(), published, apart) {
+                    (false, ..) => greys == [1.0],
+                    (true, true, true) => greys.len() >= 2 && greys.iter().all(|g| !(0.1..1.0).contains(g)),
+                    (true, false, true) => greys[0] > 0.98,
+                    (true, published, false) => greys.len() >= if published { 2 } else { 3 } && greys[0] < 0.9,
+                };
+                assert!(right, "{}: {greys:?}", path.display());
+                // What the picture says of itself: few rays are off a little, means over coarse simplices more, the thesis's
+                // methods far.
+                if render.occlusion.is_some() {
+                    let rms = number(&folder.path().join(file), "occlusion_rms_error");
+                    println!("{}: {} off by {rms}", path.display(), file.display());
+                    let right = match (published, render.shading) {
+                        (true, _) => rms > 0.2,
+                        (false, Shading::Flat) => rms < 0.12,
+                        (false, _) => rms < 0.035,
+                    };
+                    assert!(right, "{}: {rms}", path.display());
+                }
             }
             if let Some(file) = write.files.get(Format::Raw) {
                 assert_eq!(std::fs::metadata(folder.path().join(file)).unwrap().len(), 12 * voxels as u64);

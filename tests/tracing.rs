@@ -8,9 +8,11 @@ use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
 use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
 use ao4d::render::filters::denoise::Refine;
-use ao4d::render::filters::{Dilate, denoise};
+use ao4d::render::filters::{Dilate, ImageFilter, denoise};
 use ao4d::render::tone::{to_linear, to_screen};
-use ao4d::render::{Aov, Camera, DepthCue, Light, Lighting, Projection, Renderer, Shading, Slab, Source, View};
+use ao4d::render::{
+    Accuracy, Aov, Camera, DepthCue, Light, Lighting, Projection, Renderer, Shading, Slab, Source, View,
+};
 use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
 use ao4d::trace::{NOTHING, RayBackend, Sampling};
 use ao4d::volume::Values;
@@ -579,4 +581,69 @@ fn supersampled_voxels_are_means_of_what_they_show() {
 fn slabs_make_up_the_picture() {
     slabs::<3>();
     slabs::<4>();
+}
+
+/// A box over a floor, and what a camera sees of it.
+fn seen_boxes<const D: usize>(shading: Shading, more: impl FnOnce(&mut Renderer<D>)) -> (Vec<f64>, Option<Accuracy>) {
+    let backend = floor_and_box::<D>();
+    let camera = Camera::new(&View { eye: View::<D>::default().eye * 3.0, ..View::default() }).unwrap();
+    let mut renderer = Renderer::new(backend, camera, if D == 4 { [20, 20, 20] } else { [70, 70, 1] }, shading);
+    more(&mut renderer);
+    let depth = renderer.grid.dimensions[2];
+    let mut values = Vec::new();
+    let keep = |slab: Slab| {
+        values = slab.arrays[0].values.to_f64();
+        Ok::<(), ao4d::occlusion::Error>(())
+    };
+    let accuracy = renderer.render(&[Aov::AmbientOcclusion], Some(depth), &Silent, keep).unwrap();
+    (values, accuracy)
+}
+
+fn pictures_measure_themselves<const D: usize>() {
+    let vertices = floor_and_box::<D>().tracer().mesh().vertices.len();
+    let constant = |value: f32| Estimates { values: vec![value; vertices], errors: vec![0.0; vertices], rays: 0 };
+    let smooth = |value: f32| Shading::Smooth(Arc::new(constant(value)));
+    let by_rays = |rays| Estimator::Sampled(Sampling::new(rays, 5));
+    let audit = |renderer: &mut Renderer<D>| renderer.audit = Some(Sampling::new(256, 77));
+    assert_eq!(seen_boxes::<D>(smooth(1.0), |_| ()).1, None, "nobody asked");
+    // Held against all voxels and many rays, what 512 of them say is right to a tenth, and to 0.003, below which the noise of
+    // the rays that look again is not known well enough.
+    let (truth, none) = seen_boxes::<D>(Shading::Voxel(by_rays(4096)), |_| ());
+    assert_eq!(none, None);
+    let (covered, _) = seen_boxes::<D>(smooth(0.0), |_| ());
+    let seen: Vec<usize> = (0..truth.len()).filter(|&n| covered[n] == 0.0).collect();
+    let rms =
+        |values: &[f64]| (seen.iter().map(|&n| (values[n] - truth[n]).powi(2)).sum::<f64>() / seen.len() as f64).sqrt();
+    for (name, shading) in [
+        ("open", smooth(1.0)),
+        ("half", smooth(0.5)),
+        ("eight rays", Shading::Voxel(by_rays(8))),
+        ("many rays", Shading::Voxel(by_rays(1024))),
+    ] {
+        let (values, accuracy) = seen_boxes::<D>(shading, audit);
+        let (found, real) = (accuracy.unwrap(), rms(&values));
+        assert_eq!(found.voxels, 512.min(seen.len()));
+        let room = 0.12 * real + 0.003;
+        assert!((found.rms - real).abs() < room, "{D}D, {name}: measured {}, is {real}", found.rms);
+        assert!(found.largest >= found.rms && found.largest <= 1.0, "{D}D, {name}: {found:?}");
+    }
+    // Few rays beside wrong values at vertices, denoised; and more rays where those are not enough.
+    let auto = |tolerance: Option<f64>| {
+        let shading = Shading::Auto(Arc::new(constant(1.0)), by_rays(8));
+        seen_boxes::<D>(shading, |renderer| {
+            renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, Sampling::new(8, 5)));
+            let most = Sampling::new(1024, 5);
+            let refine = |t| Box::new(Refine::new(Arc::clone(&renderer.backend), most, t)) as Box<dyn ImageFilter<D>>;
+            renderer.filters.extend(tolerance.map(refine));
+        })
+        .0
+    };
+    let [few, loose, tight] = [None, Some(0.02), Some(0.005)].map(|tolerance| rms(&auto(tolerance)));
+    assert!(loose < 0.02 && tight < 0.006 && tight < 0.5 * few, "{D}D: {few} {loose} {tight}");
+}
+
+#[test]
+fn pictures_tell_how_far_off_they_are_and_keep_to_a_tolerance() {
+    pictures_measure_themselves::<3>();
+    pictures_measure_themselves::<4>();
 }

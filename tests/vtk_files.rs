@@ -93,6 +93,39 @@ fn slabs_give_the_same_bytes_as_the_whole() {
 }
 
 #[test]
+fn numbers_may_be_set_until_the_file_is_finished() {
+    let volume = volume([9, 5, 7]);
+    let specs: Vec<_> = volume.arrays.iter().map(|a| ArraySpec::new(&a.name, a.values.kind(), a.components)).collect();
+    for encoding in ENCODINGS {
+        for compression in COMPRESSIONS {
+            // As long as a number's text can be, and as short.
+            for number in [0.0, -1.797_693_134_862_315_7e308, 0.1 + 0.2] {
+                let with = |number| Settings {
+                    numbers: vec![("error".into(), number)],
+                    ..settings(encoding, compression, &volume)
+                };
+                let write = |first: f64| {
+                    let mut writer =
+                        VtiWriter::new(Cursor::new(Vec::new()), &volume.grid, &specs, &with(first)).unwrap();
+                    for (i, array) in volume.arrays.iter().enumerate() {
+                        writer.write_slab(i, 0, &array.values).unwrap();
+                    }
+                    writer.set_number("error", number);
+                    writer.finish().unwrap().into_inner()
+                };
+                let bytes = write(0.0);
+                assert_eq!(bytes, write(number), "{number} {encoding:?} {compression:?}");
+                let read = parsed(&bytes);
+                assert_eq!((&read.grid, &read.arrays), (&volume.grid, &volume.arrays));
+                let text = String::from_utf8_lossy(&bytes).into_owned();
+                let told = text.split("Name=\"error\"").nth(1).unwrap().split(['>', '<']).nth(1).unwrap();
+                assert_eq!(told.trim().parse::<f64>().unwrap(), number);
+            }
+        }
+    }
+}
+
+#[test]
 fn what_was_not_announced_is_refused() {
     let volume = volume([2, 3, 4]);
     let specs = [ArraySpec::new("opacity", Kind::F32, 1)];

@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::describe::{Counts, grouped};
 use super::occlusion::{self, OcclusionPlan};
-use super::render::scene_and_occlusion;
 use super::scene::ScenePlan;
+use super::subject::scene_and_occlusion;
 use super::write::vtu;
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::io;

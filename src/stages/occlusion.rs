@@ -20,7 +20,6 @@ use super::render::{self, RenderPlan};
 use super::scene::{MISSING, ScenePlan};
 use super::write::{self, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
-use crate::geometry::Dimension;
 use crate::io;
 use crate::occlusion::exact::{self, Budget};
 use crate::occlusion::{self, Deviations, Estimates, Estimator, ProgramDeviations, Sidecar};
@@ -530,68 +529,6 @@ impl Method {
     /// Whether it is there for the thesis's figures alone.
     pub fn is_of_the_thesis(self) -> bool {
         matches!(self, Method::AsPublished | Method::AsProgrammed)
-    }
-}
-
-/// Rays that a voxel is looked at again with, to measure pictures,
-const AUDIT_RAYS: u32 = 256;
-/// none of which are a picture's own.
-const AUDIT_SEED: u64 = 0x5851_f42d_4c95_7f2d;
-
-impl OcclusionPlan {
-    /// The rays that a voxel takes beside the vertices' values, for `shading: auto`: so few that what is left of their noise
-    /// among the neighbours is well below the tolerance, by the same sampler, and no more than a vertex takes. None where
-    /// rays are no way to the same values: of a file nobody knows how it came about, and the thesis's methods have values
-    /// at vertices only.
-    pub fn at_voxels(&self, dimension: Dimension, tolerance: f64) -> Option<Sampling> {
-        let most = self.most_at_voxels()?;
-        let noise = |samples: u32| Sampling { samples, ..most }.expected_variance(dimension, 0.5).sqrt();
-        let enough = |samples: &u32| noise(*samples) * dimension.pick(0.07, 0.1) <= 0.75 * tolerance;
-        let samples = (2..).map(|n| 1 << n).find(|n| *n >= most.samples || enough(n)).unwrap_or(most.samples);
-        Some(Sampling { samples: samples.min(most.samples), ..most })
-    }
-
-    /// The most rays that a voxel takes, for `shading: auto`: as many as a vertex.
-    pub fn most_at_voxels(&self) -> Option<Sampling> {
-        let OcclusionSource::Compute(computation) = &self.source else { return None };
-        let most = match computation.samples {
-            Samples::Fixed(samples) => u32::try_from(samples).unwrap_or(u32::MAX),
-            Samples::Target { .. } | Samples::Exact => 256,
-        };
-        let sampling = Sampling {
-            sampler: if computation.method == Method::Random { Sampler::Random } else { Sampler::Sobol },
-            samples: most,
-            seed: computation.seed,
-            max_distance: computation.max_distance.map_or(f32::INFINITY, |d| d as f32),
-            target: None,
-        };
-        (!computation.method.is_of_the_thesis()).then_some(sampling)
-    }
-
-    /// Rays to measure pictures by: what this occlusion is meant to be, whatever its method. None for a file nobody knows
-    /// how it came about.
-    pub fn audit(&self) -> Option<Sampling> {
-        let OcclusionSource::Compute(computation) = &self.source else { return None };
-        let max_distance = computation.max_distance.map_or(f32::INFINITY, |d| d as f32);
-        Some(Sampling { max_distance, ..Sampling::new(AUDIT_RAYS, computation.seed ^ AUDIT_SEED) })
-    }
-
-    /// The rays that each voxel takes, if that is a fixed number of rays, for `shading: voxel`.
-    pub fn instead_of_vertices(&self) -> Option<Sampling> {
-        let OcclusionSource::Compute(computation) = &self.source else { return None };
-        match computation.estimator() {
-            Estimator::Sampled(sampling) if sampling.target.is_none() => Some(sampling),
-            _ => None,
-        }
-    }
-
-    /// Where visible points have their occlusion from, unless it is said: from vertices and rays, or from vertices alone
-    /// if their values are not made by rays.
-    pub fn default_shading(&self) -> render::Shading {
-        match &self.source {
-            OcclusionSource::Compute(computation) if computation.method.is_by_rays() => render::Shading::Auto,
-            _ => render::Shading::Smooth,
-        }
     }
 }
 
