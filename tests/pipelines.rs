@@ -63,22 +63,25 @@ fn every_pipeline_leaves_what_it_promises() {
                 // On the coordinates of the thesis's program two tetrahedra stand so far apart that hardly anything is hidden;
                 // the program has one of them dark and the other open.
                 let apart = ["fig_5_1.yaml", "fig_5_2.yaml"].iter().any(|name| path.ends_with(name));
+                let flat = matches!(render.shading, Shading::Flat);
                 let right = match (render.occlusion.is_some(), published, apart) {
                     (false, ..) => greys == [1.0],
                     (true, true, true) => greys.len() >= 2 && greys.iter().all(|g| !(0.1..1.0).contains(g)),
                     (true, false, true) => greys[0] > 0.98,
-                    (true, published, false) => greys.len() >= if published { 2 } else { 3 } && greys[0] < 0.9,
+                    (true, true, false) => greys[0] < 0.9,
+                    // A mean a simplex, of two simplices; everywhere else many greys.
+                    (true, false, false) => greys.len() >= if flat { 2 } else { 3 } && greys[0] < 0.9,
                 };
                 assert!(right, "{}: {greys:?}", path.display());
-                // What the picture says of itself: few rays are off a little, means over coarse simplices more, the thesis's
-                // methods far.
+                // What the picture says of itself: few rays are off a little, values at vertices of coarse simplices more, the
+                // thesis's methods far.
                 if render.occlusion.is_some() {
                     let rms = number(&folder.path().join(file), "occlusion_rms_error");
                     println!("{}: {} off by {rms}", path.display(), file.display());
                     let right = match (published, render.shading) {
-                        (true, _) => rms > 0.2,
-                        (false, Shading::Flat) => rms < 0.12,
-                        (false, _) => rms < 0.035,
+                        (true, _) => rms > 0.1,
+                        (false, Shading::Flat | Shading::Smooth) => rms < 0.15,
+                        (false, Shading::Voxel | Shading::Auto) => rms < 0.035,
                     };
                     assert!(right, "{}: {rms}", path.display());
                 }

@@ -629,9 +629,9 @@ fn pictures_measure_themselves<const D: usize>() {
     }
     // Few rays beside wrong values at vertices, denoised; and more rays where those are not enough.
     let auto = |tolerance: Option<f64>| {
-        let shading = Shading::Auto(Arc::new(constant(1.0)), by_rays(8));
+        let shading = Shading::Auto(Arc::new(constant(1.0)), by_rays(4));
         seen_boxes::<D>(shading, |renderer| {
-            renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, Sampling::new(8, 5)));
+            renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, Sampling::new(4, 5)));
             let most = Sampling::new(1024, 5);
             let refine = |t| Box::new(Refine::new(Arc::clone(&renderer.backend), most, t)) as Box<dyn ImageFilter<D>>;
             renderer.filters.extend(tolerance.map(refine));
@@ -639,7 +639,7 @@ fn pictures_measure_themselves<const D: usize>() {
         .0
     };
     let [few, loose, tight] = [None, Some(0.02), Some(0.005)].map(|tolerance| rms(&auto(tolerance)));
-    assert!(loose < 0.02 && tight < 0.006 && tight < 0.5 * few, "{D}D: {few} {loose} {tight}");
+    assert!(loose < 0.02 && tight < 0.006 && tight < 0.7 * few, "{D}D: {few} {loose} {tight}");
 }
 
 #[test]
