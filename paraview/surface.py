@@ -128,7 +128,7 @@ if together.GetNumberOfInputConnections(0) > 0:
 
 
 def panel_width(columns):
-    return 3200 // columns
+    return (1280 if FRAMES else 3200) // columns
 
 
 def bodies_of(reader, name):
@@ -208,7 +208,7 @@ def show_solids(panels, readers, arrays, views, centre, shape):
     bodies = [bodies_of(reader, name) for reader, name in zip(readers, names)]
     for body in bodies:
         body.UpdatePipeline()
-    box = frame_of(bodies) or union_of([grid_bounds(panel) for panel in panels])
+    box = (frame_over_time(panels, readers) if FRAMES else frame_of(bodies)) or union_of([grid_bounds(panel) for panel in panels])
     cuts = [cut_open(body, name, centre, box) for body, name in zip(bodies, names)]
     if CUT is not None:
         link_cuts(cuts)

@@ -80,6 +80,13 @@ fn accepts_and_refuses_as_the_decoder_does() {
         ("  - wireframe: {vtp: a.vtp, input: a, edges: all, near: 0.1}\n", true),
         ("  - wireframe: {vtp: a.vtp, angle: 20}\n", true),
         ("  - wireframe: {vtp: a.vtp, edges: some}\n", false),
+        (
+            "  - animate: {frames: 3, vti: a.vti, turn: {plane: xw, from: -90, to: 90, center: [0]}, moves: [a, b]}\n",
+            true,
+        ),
+        ("  - animate: {frames: 3, vti: a.vti, move: {to: [1]}, scan: [0, 1], moves: eye, rate: 12.5}\n", true),
+        ("  - animate: {vti: a.vti, scan: [0, 1]}\n", false),
+        ("  - animate: {frames: 3, vti: a.vti, turn: {from: 0}}\n", false),
         ("  - mesh: {vtu: a.vtu, arrays: [normal]}\n", false),
         ("inputs: [b]\n", false),
         ("  - paraview: {state: a.py, cut: {plane: w}}\n", false),

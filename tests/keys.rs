@@ -32,6 +32,7 @@ stages:
   - slice: {id: c, input: s, occlusion: none, normal: [0, 0, 0, 1], at: 0.1, vtp: c.vtp}
   - slice: {id: cs, input: s, occlusion: none, range: [0, 1], count: 3, vtp: cs.vtp}
   - wireframe: {id: wire, input: r, edges: feature, angle: 20, near: 0.1, vtp: wire.vtp}
+  - animate: {id: an, input: r, frames: 3, moves: scene, turn: {plane: xw, from: 0, to: 90, center: [0, 0, 0, -1]}, move: {from: [0, 0, 0, 0], to: [0, 0, 0, 1]}, scan: [0, 0.1], rate: 24, vti: an.vti, arrays: [rgba, opacity], encoding: appended, compression: none}
   - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
 ";
 
@@ -46,6 +47,7 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("PipelineSpec.stages", Err("the stages follow")),
     ("SceneSpec.id", Err("a name for other stages")),
     ("SceneSpec.dimension", Err("changes what everything else may be; see `a_scene_s_dimension_counts`")),
+    ("SceneSpec.twin", Err("adds stages, whose files have keys of their own")),
     ("SceneSpec.objects", Ok("s.objects[0].tesseract.size=0.6")),
     ("OcclusionSpec.id", Err("a name for other stages")),
     ("OcclusionSpec.input", Err("`loaded_values_and_other_scenes_count`")),
@@ -115,6 +117,24 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("WireframeSpec.angle", Ok("wire.angle=21")),
     ("WireframeSpec.near", Ok("wire.near=0.2")),
     ("WireframeSpec.vtp", Err("a file doesn't depend on its name")),
+    ("AnimateSpec.id", Err("a name for other stages")),
+    ("AnimateSpec.input", Ok("an.input=parallel")),
+    ("AnimateSpec.frames", Err("changes which files there are; each frame's key has where the path is")),
+    ("AnimateSpec.moves", Ok("an.moves=eye")),
+    ("AnimateSpec.turn", Err("its keys follow")),
+    ("TurnSpec.plane", Ok("an.turn.plane=yw")),
+    ("TurnSpec.from", Ok("an.turn.from=1")),
+    ("TurnSpec.to", Ok("an.turn.to=91")),
+    ("TurnSpec.center", Ok("an.turn.center=[0, 0, 0, -2]")),
+    ("AnimateSpec.move", Err("its keys follow")),
+    ("MoveSpec.from", Ok("an.move.from=[0, 0, 1, 0]")),
+    ("MoveSpec.to", Ok("an.move.to=[0, 0, 1, 1]")),
+    ("AnimateSpec.scan", Ok("an.scan=[0, 0.2]")),
+    ("AnimateSpec.rate", Ok("an.rate=25")),
+    ("AnimateSpec.vti", Err("a file doesn't depend on its name")),
+    ("AnimateSpec.arrays", Ok("an.arrays=[opacity, rgba]")),
+    ("AnimateSpec.encoding", Ok("an.encoding=inline")),
+    ("AnimateSpec.compression", Ok("an.compression=zlib")),
     ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.state", Err("a state is held against the file that is there, whole")),
@@ -171,6 +191,8 @@ fn every_key_counts_or_has_a_reason() {
             "ParaviewSpec",
             "LightSpec",
             "DepthCueSpec",
+            "TurnSpec",
+            "MoveSpec",
         ];
         // Of a new stage nothing is known here yet.
         let kinds = schema["$defs"]["StageSpec"].to_string();

@@ -98,6 +98,7 @@ fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
         panels: panels.iter().map(panel).collect(),
         source,
         cut: Cut::Octant { corner: None },
+        film: None,
         screenshot: Some("figure.png".into()),
         size: Some([800, 500]),
         style: Style::Voxels,

@@ -43,7 +43,7 @@ pub enum RunError {
     Stage(StageError),
     /// A picture doesn't fit in memory.
     #[error(
-        "render {render}: one layer of its picture takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays"
+        "{render}: one layer of its picture takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays"
     )]
     Memory {
         /// The picture.
@@ -151,7 +151,11 @@ fn check_resources(pipeline: &Pipeline, book: &Book) -> Result<(), RunError> {
     if let (Some((needed, stage)), Some(available)) = (most, available_memory())
         && needed > available
     {
-        return Err(RunError::Memory { render: plan.stages[stage].id.clone(), needed, available });
+        return Err(RunError::Memory {
+            render: format!("{} {}", plan.kind(stage), plan.stages[stage].id),
+            needed,
+            available,
+        });
     }
     let disk = needs.iter().fold(0, |sum: u64, (needs, _)| sum.saturating_add(needs.disk));
     Ok(io::check_free_space(&plan.out, disk)?)

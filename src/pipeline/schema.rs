@@ -22,6 +22,7 @@ mod tests {
     use crate::render::Aov;
     use crate::scene::ObjectSpec;
     use crate::stages::StageSpec;
+    use crate::stages::animate::{AnimateSpec, MoveSpec, TurnSpec};
     use crate::stages::camera::{CameraSpec, Projection};
     use crate::stages::cut::{Axis, Plane};
     use crate::stages::mesh::MeshSpec;
@@ -72,6 +73,9 @@ mod tests {
             ("RenderSpec", decoder_knows::<RenderSpec>("{zzz: 1}")),
             ("CameraSpec", decoder_knows::<CameraSpec>("{zzz: 1}")),
             ("WriteSpec", decoder_knows::<WriteSpec>("{zzz: 1}")),
+            ("AnimateSpec", decoder_knows::<AnimateSpec>("{zzz: 1}")),
+            ("TurnSpec", decoder_knows::<TurnSpec>("{zzz: 1}")),
+            ("MoveSpec", decoder_knows::<MoveSpec>("{zzz: 1}")),
             ("MeshSpec", decoder_knows::<MeshSpec>("{zzz: 1}")),
             ("InputSpec", decoder_knows::<InputSpec>("{zzz: 1}")),
             ("ParaviewSpec", decoder_knows::<ParaviewSpec>("{zzz: 1}")),

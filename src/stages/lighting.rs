@@ -248,14 +248,14 @@ impl LightingPlan {
 }
 
 /// What to tell of lights that reached nothing.
-pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>, id: &str) -> Vec<String> {
+pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>) -> Vec<String> {
     let mut notes = Vec::new();
     for i in lighting.in_vain() {
         let why = match lighting.lights()[i].source {
             Source::Point(_) => "it is inside a body or behind one, or what is seen turns its back to it",
             Source::Directional(_) => "what is seen turns its back to it, or lies in the shadow of something",
         };
-        notes.push(format!("render {id}: lights[{i}] reaches nothing that is seen: {why}"));
+        notes.push(format!("lights[{i}] reaches nothing that is seen: {why}"));
     }
     notes
 }

@@ -1,5 +1,5 @@
 //! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`, `mesh`, `slice`,
-//! `wireframe`.
+//! `wireframe`, `animate`.
 //!
 //! A stage's file holds all there is to know of it: what is written in YAML (its `Spec`), what is understood of that
 //! (its `Plan`: checked, resolved, every default filled in), its part of the key that tells whether a file is fresh, its
@@ -17,8 +17,10 @@
 //! - a `write` works on a render;
 //! - a `mesh` or a `slice` works on a scene, and has the values of an occlusion of that scene, found as a render finds them;
 //! - a `wireframe` works on the scene of a render, and looks through its camera;
-//! - a `paraview` figure works on writes, and finds them also by the name of their render.
+//! - an `animate` works on a render, whose picture it makes again and again while something moves;
+//! - a `paraview` figure works on writes, which it finds also by the name of their render, and on animations.
 
+pub mod animate;
 pub mod camera;
 pub mod cut;
 pub mod describe;
@@ -41,6 +43,7 @@ pub mod scene;
 pub mod slice;
 mod subject;
 pub(crate) mod suggest;
+mod twin;
 pub mod wireframe;
 pub mod write;
 
@@ -341,4 +344,6 @@ stages! {
     Slice: slice::SliceSpec => slice::SlicePlan;
     /// Edges of a scene's bodies as a render's camera sees them.
     Wireframe: wireframe::WireframeSpec => wireframe::WireframePlan;
+    /// A render again and again while something moves.
+    Animate: animate::AnimateSpec => animate::AnimatePlan;
 }

@@ -44,6 +44,11 @@ impl Outputs {
     }
 }
 
+/// The names of files as a list beside them has them.
+pub(super) fn file_names(files: &[PathBuf]) -> Vec<String> {
+    files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned()).collect()
+}
+
 /// Why a text can't name a file below the output folder.
 fn unfit(name: &str) -> Option<String> {
     if name.is_empty() {

@@ -327,7 +327,7 @@ impl OcclusionPlan {
 }
 
 /// Rays of an occlusion, where they are known: at most so many for a target error.
-fn rays(me: Ref<OcclusionPlan>, plan: &Plan, counts: &[Counts]) -> Option<u64> {
+pub(super) fn rays(me: Ref<OcclusionPlan>, plan: &Plan, counts: &[Counts]) -> Option<u64> {
     let vertices = counts.get(plan[me].scene.nth())?.vertices;
     let each = match &plan[me].source {
         OcclusionSource::Load(_) => 0,
@@ -379,6 +379,25 @@ pub fn values<const D: usize>(
     Ok(())
 }
 
+/// The values of another scene than the plan's, of which only this picture is made.
+///
+/// # Errors
+/// If they can't be computed, or Ctrl-C was pressed.
+pub(super) fn values_for<const D: usize>(
+    picture: (&str, &RenderPlan),
+    computation: &Computation,
+    run: &Run,
+    scene: &SceneRun<D>,
+) -> Result<Estimates, StageError> {
+    let count = scene.session.mesh().vertices.len();
+    let mut left = computation.most_rays().saturating_mul(count as u64) / 4;
+    let mut mask = vec![false; count];
+    let mask = render::mark_seen(picture, run, scene, &mut left, &mut mask)?.then_some(mask);
+    let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
+    let _running = run.progress.stage(&format!("occlusion of {}", picture.0), asked as u64);
+    Ok(scene.session.occlusion(computation.estimator(), mask.as_deref(), run.progress)?)
+}
+
 fn compute<const D: usize>(
     me: Ref<OcclusionPlan>,
     computation: &Computation,
@@ -414,7 +433,7 @@ fn mask<const D: usize>(
     for (stage, render) in plan.all::<RenderPlan>() {
         let values = render.occlusion == Some(me) && render.shading != render::Shading::Voxel;
         if values && render::is_stale(stage, plan, &|file| run.is_stale(file)) {
-            let seen = render::mark_seen(stage, run, scene, &mut left, &mut mask)?;
+            let seen = render::mark_seen((plan.id(stage), render), run, scene, &mut left, &mut mask)?;
             if !seen {
                 return Ok(None);
             }

@@ -4,9 +4,9 @@
 //! memory as a whole.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,13 +21,16 @@ use super::subject::scene_and_occlusion;
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::geometry::Dimension;
+use crate::io;
 use crate::occlusion::Estimator;
+use crate::progress::Progress;
 use crate::render::filters::denoise::Refine;
 use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
 use crate::render::{self, Accuracy, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
 use crate::text::number;
 use crate::trace::Sampling;
+use crate::volume::Grid;
 
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
@@ -246,8 +249,8 @@ impl Stage for RenderPlan {
     }
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
-        let written = plan.all::<WritePlan>().any(|(_, write)| write.render == me);
-        (!written).then_some("no `write` stage writes this image")
+        let used = (0..plan.stages.len()).any(|stage| plan.works_on(stage).contains(&me.index()));
+        (!used).then_some("no `write` stage writes this image")
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -284,26 +287,7 @@ impl Stage for RenderPlan {
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == me) {
             aovs.extend(write.stale(Content::Voxels, stale).into_iter().flat_map(|file| file.format.arrays(write)));
         }
-        if aovs.is_empty() {
-            return Needs::default();
-        }
-        let dimension = plan[render.scene].dimension;
-        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
-        let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
-        if render.lighting.is_some() {
-            columns |= Columns::DIRECT;
-        }
-        let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
-        if render.denoise {
-            columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
-            columns |= Columns::FITTED | Columns::MISFIT | Columns::ERROR;
-            halo += 10;
-        }
-        let samples = (render.supersample.pow(axes) * size_of::<u32>()) as u64;
-        // Filters keep the layers that they look at.
-        let layers = if axes == 3 { (1 + halo).min(render.dimensions[2] as u64) } else { 1 };
-        let voxel = samples + layers * columns.bytes::<4>() as u64 + arrays;
-        Needs { memory: (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel), disk: 0 }
+        Needs { memory: if aovs.is_empty() { 0 } else { render.memory(plan, &aovs) }, disk: 0 }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
@@ -339,6 +323,71 @@ impl Stage for RenderPlan {
         if let Some(occlusion) = render.occlusion.filter(|_| render.shading != Shading::Voxel) {
             occlusion::values(occlusion, run, scene)?;
         }
+        let name = format!("render {}", plan.id(me));
+        let made = render.picture(&name, plan, scene, run.progress, |grid, hash| {
+            PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), grid, hash)
+        })?;
+        let mut notes: Vec<String> =
+            made.nothing.iter().map(|why| format!("{name} shows background only: {why}")).collect();
+        notes.extend(made.in_vain.iter().map(|told| format!("{name}: {told}")));
+        if made.behind > 0 {
+            notes.push(format!(
+                "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
+                 turn that object by `orientation: eye`, or take `shading: voxel`",
+                plan.id(me),
+                grouped(made.behind),
+                grouped(made.seen)
+            ));
+        }
+        for (file, bytes) in made.files {
+            run.made(&file, bytes, notes.clone())?;
+        }
+        let rate = render.voxels() as f64 / made.rendering.as_secs_f64() / 1e6;
+        let off = made.accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
+            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
+        });
+        Ok(format!(
+            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
+            grouped(made.seen),
+            grouped(render.voxels())
+        ))
+    }
+}
+
+impl RenderPlan {
+    /// The memory of a slab of one layer with these arrays.
+    pub(super) fn memory(&self, plan: &Plan, aovs: &BTreeSet<Aov>) -> u64 {
+        let render = self;
+        let dimension = plan[render.scene].dimension;
+        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
+        let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
+        if render.lighting.is_some() {
+            columns |= Columns::DIRECT;
+        }
+        let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
+        if render.denoise {
+            columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
+            columns |= Columns::FITTED | Columns::MISFIT | Columns::ERROR;
+            halo += 10;
+        }
+        let samples = (render.supersample.pow(axes) * size_of::<u32>()) as u64;
+        // Filters keep the layers that they look at.
+        let layers = if axes == 3 { (1 + halo).min(render.dimensions[2] as u64) } else { 1 };
+        let voxel = samples + layers * columns.bytes::<4>() as u64 + arrays;
+        (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel)
+    }
+
+    /// Makes the picture, and the files that `open` opens for it; `name` is what it is called where progress is told.
+    /// Values at vertices must be known where they are shown.
+    pub(super) fn picture<const D: usize>(
+        &self,
+        name: &str,
+        plan: &Plan,
+        scene: &SceneRun<D>,
+        progress: &dyn Progress,
+        open: impl FnOnce(&Grid, &str) -> Result<PictureFiles, io::Error>,
+    ) -> Result<Picture, StageError> {
+        let render = self;
         let shading = shading(plan, render, scene);
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
@@ -347,12 +396,12 @@ impl Stage for RenderPlan {
         picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
-        let mut files = PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), &picture.grid, hash)?;
+        let mut files = open(&picture.grid, hash)?;
         let aovs = files.aovs().to_vec();
         let (mut seen, mut behind) = (0, 0);
         // Two passes over the voxels: what is seen, and its shade.
-        let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
-        let accuracy = picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
+        let running = progress.stage(name, 2 * render.voxels());
+        let accuracy = picture.render(&aovs, None, progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;
             behind += slab.behind;
             Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
@@ -363,32 +412,38 @@ impl Stage for RenderPlan {
         }
         let rendering = start.elapsed();
         let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
-        let mut notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
-        if let Some(lighting) = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit())) {
-            notes.extend(lighting::in_vain(lighting, plan.id(me)));
-        }
-        if behind > 0 && picture.shading.is_interpolated() {
-            notes.push(format!(
-                "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
-                 turn that object by `orientation: eye`, or take `shading: voxel`",
-                plan.id(me),
-                grouped(behind),
-                grouped(seen)
-            ));
-        }
-        for (file, bytes) in files.finish()? {
-            run.made(&file, bytes, notes.clone())?;
-        }
-        let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
-        let off = accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
-            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
-        });
-        Ok(format!(
-            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
-            grouped(seen),
-            grouped(render.voxels())
-        ))
+        let lit = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit()));
+        Ok(Picture {
+            voxels: render.voxels(),
+            seen,
+            behind: if picture.shading.is_interpolated() { behind } else { 0 },
+            accuracy,
+            nothing: nothing.then(|| nothing_seen(&picture)),
+            in_vain: lit.map_or_else(Vec::new, lighting::in_vain),
+            rendering,
+            files: files.finish()?,
+        })
     }
+}
+
+/// What came of a picture.
+pub(super) struct Picture {
+    /// How many voxels it has.
+    pub voxels: u64,
+    /// How many voxels see something.
+    pub seen: u64,
+    /// How many of them see a surface from behind, with the occlusion of its front.
+    pub behind: u64,
+    /// How far off it is.
+    pub accuracy: Option<Accuracy>,
+    /// Why it shows nothing, if it does though there is something.
+    pub nothing: Option<String>,
+    /// What its lights do in vain.
+    pub in_vain: Vec<String>,
+    /// How long it took.
+    pub rendering: Duration,
+    /// Its files, with their lengths.
+    pub files: Vec<(PathBuf, u64)>,
 }
 
 /// Whether some file has to be made that holds voxels of a render.
@@ -409,13 +464,12 @@ pub(super) fn array_bytes(aov: Aov, dimension: Dimension) -> u64 {
 /// Marks the vertices of the simplices that a render shows, unless that costs more than is `left` to spend on it.
 /// Returns whether it did.
 pub(super) fn mark_seen<const D: usize>(
-    me: Ref<RenderPlan>,
+    (name, render): (&str, &RenderPlan),
     run: &Run,
     scene: &SceneRun<D>,
     left: &mut u64,
     mask: &mut [bool],
 ) -> Result<bool, StageError> {
-    let render = &run.plan[me];
     let camera = camera::camera(&render.camera)?;
     // All samples, not the voxels' centres alone.
     let samples = |a: usize| if a < D - 1 { render.dimensions[a] * render.supersample } else { 1 };
@@ -426,7 +480,7 @@ pub(super) fn mark_seen<const D: usize>(
     if *left == 0 {
         return Ok(false);
     }
-    let _running = run.progress.stage(&format!("what {} shows", run.plan.id(me)), render.voxels());
+    let _running = run.progress.stage(&format!("what {name} shows"), render.voxels());
     let thick = (SLAB_BYTES / size_of::<u32>() / grid.layer_len()).clamp(1, grid.dimensions[2]);
     for first in (0..grid.dimensions[2]).step_by(thick) {
         let layers = first..grid.dimensions[2].min(first + thick);
@@ -503,14 +557,14 @@ fn short(error: f64) -> String {
 }
 
 /// Why a picture shows nothing.
-fn nothing_seen<const D: usize>(picture: &Renderer<D>, id: &str) -> String {
+fn nothing_seen<const D: usize>(picture: &Renderer<D>) -> String {
     let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
-    let why = if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
+    if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
         "the scene lies wholly behind the camera; turn the camera, or move it back"
     } else {
         "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"
-    };
-    format!("render {id} shows background only: {why}")
+    }
+    .to_owned()
 }
 
 impl Shading {
@@ -622,10 +676,11 @@ stages:
         let (renders, figures): (Vec<_>, Vec<_>) =
             (plan.all::<RenderPlan>().collect(), plan.all::<FigurePlan>().map(|(_, figure)| figure).collect());
         let scenes: Vec<_> = plan.all::<ScenePlan>().map(|(_, scene)| scene).collect();
-        let nth = |figure: &FigurePlan| -> Vec<usize> { figure.writes.iter().map(|write| write.nth()).collect() };
+        // As JSON a write is its number.
+        let nth = |figure: &FigurePlan| serde_json::to_value(&figure.writes).unwrap();
         let arrays: Vec<&str> = renders[0].1.arrays.iter().map(|array| array.name()).collect();
         assert_eq!(arrays, ["rgba", "opacity", "rgb", "normal"]);
-        assert_eq!((nth(figures[0]), nth(figures[1])), (vec![1], vec![0, 0]));
+        assert_eq!((nth(figures[0]), nth(figures[1])), (json!([1]), json!([0, 0])));
         assert_eq!(scenes[0].eye, Some(vec![0.0, 0.0, 0.0, 2.0]), "the first render's");
         assert_eq!(scenes[1].eye, None);
         assert_eq!(plan.all::<WritePlan>().map(|(write, _)| plan.id(write)).collect::<Vec<_>>(), ["write", "write-2"]);

@@ -2,6 +2,7 @@
 
 mod caching;
 mod faults;
+mod frames;
 mod input;
 mod interrupt;
 mod limits;

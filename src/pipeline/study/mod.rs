@@ -77,7 +77,7 @@ pub fn study(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) 
 fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, RunError> {
     let plan = &pipeline.plan;
     let refuse = |path: &str, message: &str| RunError::Refused(pipeline.document.refuse(Invalid::new(path, message)));
-    let Some((stage, occlusion)) = plan.all::<OcclusionPlan>().next() else {
+    let Some((stage, occlusion)) = plan.all::<OcclusionPlan>().find(|(stage, _)| !plan.is_twin(stage.index())) else {
         return Err(refuse("stages", "there is no `occlusion` to study; add one after the scene"));
     };
     let _lock = Lock::take(&plan.out)?;
@@ -92,7 +92,7 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
             notes.push("`max_distance` is left out: all methods count occluders at any distance.".to_owned());
         }
     }
-    if plan.all::<OcclusionPlan>().count() > 1 {
+    if plan.all::<OcclusionPlan>().filter(|(stage, _)| !plan.is_twin(stage.index())).count() > 1 {
         notes.push(format!(
             "The pipeline has several occlusions; this is the scene of the first, `{}`.",
             plan.id(stage)

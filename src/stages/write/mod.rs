@@ -90,13 +90,15 @@ trait OutputFormat {
 }
 
 /// Writes the file at the path again, with another text of the pipeline; returns its length.
-type Retell = fn(&Path, &WritePlan, &str) -> Result<u64, Error>;
+pub(in crate::stages) type Retell = fn(&Path, &WritePlan, &str) -> Result<u64, Error>;
 
 /// What a file is opened with.
 struct Opening<'a> {
     path: &'a Path,
     plan: &'a Plan,
     write: &'a WritePlan,
+    /// The picture's render; of a frame of an animation the one that has its camera.
+    render: &'a RenderPlan,
     grid: &'a Grid,
     mesh_hash: &'a str,
     told: &'a str,
@@ -168,11 +170,11 @@ macro_rules! formats {
                 match self { $(Self::$name => <$key::$name>::TELLS_PIPELINE),+ }
             }
 
-            fn voxel_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
+            pub(in crate::stages) fn voxel_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
                 match self { $(Self::$name => <$key::$name>::voxel_bytes(write, dimension)),+ }
             }
 
-            fn disk_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
+            pub(in crate::stages) fn disk_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
                 match self { $(Self::$name => <$key::$name>::disk_bytes(write, dimension)),+ }
             }
 
@@ -180,7 +182,7 @@ macro_rules! formats {
                 match self { $(Self::$name => <$key::$name>::open(file)),+ }
             }
 
-            fn retell(self) -> Option<Retell> {
+            pub(in crate::stages) fn retell(self) -> Option<Retell> {
                 match self { $(Self::$name => <$key::$name>::RETELL),+ }
             }
 
@@ -337,23 +339,7 @@ impl Stage for WritePlan {
             let keys: Vec<&str> = Format::ALL.iter().map(|format| format.key()).collect();
             return Err(Invalid::new(path, format!("names no file; give at least one of {}", keys.join(", "))));
         }
-        let arrays = match &spec.arrays {
-            None => vec![Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity],
-            Some(arrays) => arrays.clone(),
-        };
-        if arrays.is_empty() {
-            return Err(Invalid::new(format!("{path}.arrays"), "the list is empty; name at least one array"));
-        }
-        for (i, array) in arrays.iter().enumerate() {
-            if arrays[..i].contains(array) {
-                return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.name())));
-            }
-            if *array == Aov::Light && resolver.plan[render].lighting.is_none() {
-                let id = resolver.plan.id(render);
-                let message = format!("render `{id}` is not lit; give it `lights`, `ambient` or `depth_cue`");
-                return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
-            }
-        }
+        let arrays = arrays(spec.arrays.as_deref(), path, render, resolver)?;
         if files.get(Format::Vti).is_none() {
             let given = [
                 ("arrays", spec.arrays.is_some()),
@@ -484,6 +470,30 @@ impl Stage for WritePlan {
         }
         Ok(String::new())
     }
+}
+
+/// The arrays that a `.vti` of a render holds, checked.
+pub(super) fn arrays(
+    given: Option<&[Aov]>,
+    path: &str,
+    render: Ref<RenderPlan>,
+    resolver: &Resolver,
+) -> Result<Vec<Aov>, Invalid> {
+    let arrays = given.map_or_else(|| vec![Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity], <[Aov]>::to_vec);
+    if arrays.is_empty() {
+        return Err(Invalid::new(format!("{path}.arrays"), "the list is empty; name at least one array"));
+    }
+    for (i, array) in arrays.iter().enumerate() {
+        if arrays[..i].contains(array) {
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.name())));
+        }
+        if *array == Aov::Light && resolver.plan[render].lighting.is_none() {
+            let id = resolver.plan.id(render);
+            let message = format!("render `{id}` is not lit; give it `lights`, `ambient` or `depth_cue`");
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
+        }
+    }
+    Ok(arrays)
 }
 
 /// Copies a file to one that takes its place when it is whole: `copy` is given both. Returns its length.

@@ -13,7 +13,7 @@ use crate::io::{AtomicFile, Error, PIPELINE};
 use crate::render::{Accuracy, Aov};
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
-use crate::stages::render::array_bytes;
+use crate::stages::render::{RenderPlan, array_bytes};
 use crate::volume::Array;
 
 pub(super) struct Vti;
@@ -48,11 +48,11 @@ impl OutputFormat for Vti {
     });
 
     fn open(
-        Opening { path, plan, write, grid, mesh_hash, told }: Opening,
+        Opening { path, plan, write, render, grid, mesh_hash, told }: Opening,
     ) -> Result<Option<Box<dyn VoxelFile>>, Error> {
-        let dimension = plan[plan[write.render].scene].dimension;
+        let dimension = plan[render.scene].dimension;
         let specs: Vec<ArraySpec> = write.arrays.iter().map(|&channel| array_spec(channel, dimension)).collect();
-        let settings = settings(plan, write, mesh_hash, told, path.parent());
+        let settings = settings(plan, write, render, mesh_hash, told, path.parent());
         let out = AtomicFile::create(path)?;
         let writer = VtiWriter::new(out, grid, &specs, &settings).map_err(AtomicFile::name_in(path))?;
         Ok(Some(Box::new(File { path: path.to_owned(), writer })))
@@ -106,8 +106,14 @@ fn encoding(write: &WritePlan) -> vti::Encoding {
 }
 
 /// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
-fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, told: &str, scratch: Option<&Path>) -> vti::Settings {
-    let render = &plan[write.render];
+fn settings(
+    plan: &Plan,
+    write: &WritePlan,
+    render: &RenderPlan,
+    mesh_hash: &str,
+    told: &str,
+    scratch: Option<&Path>,
+) -> vti::Settings {
     let scene = &plan[render.scene];
     let occlusion = render.occlusion.map(|o| match &plan[o].source {
         OcclusionSource::Compute(computation) => computation.told(),
