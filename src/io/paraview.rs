@@ -269,11 +269,16 @@ mod tests {
         assert_eq!(line(&text, "CUT"), "CUT = None");
         assert_eq!(line(&text, "SCREENSHOT"), "SCREENSHOT = 'figure.png'");
         assert_eq!(line(&text, "SIZE"), "SIZE = None");
+        assert_eq!((line(&text, "FRAMES"), line(&text, "RATE")), ("FRAMES = None".into(), "RATE = None".into()));
         assert_eq!(line(&text, "COLOR_BY"), "COLOR_BY = 'rgba'");
         assert_eq!(line(&text, "COLORBAR"), "COLORBAR = False");
         // The cut is a clip of ParaView's, and the other look isn't there.
         assert!(text.contains("Clip(registrationName") && !text.contains("RELIEF"));
 
+        figure.film = Some(Film { frames: 72, rate: 24.0 });
+        let text = state(&figure);
+        assert_eq!((line(&text, "FRAMES"), line(&text, "RATE")), ("FRAMES = 72".into(), "RATE = 24.0".into()));
+        figure.film = None;
         figure.source = Source::Raw;
         figure.cut = Cut::Plane { axis: Axis::Z, at: 0.25 };
         figure.screenshot = None;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::names::{Outputs, unfit_name};
-use super::{Invalid, Plan, Planned, Ref, Stage, StagePlan, StageSpec, suggest, twin};
+use super::{Invalid, Plan, Planned, Ref, Stage, StagePlan, StageSpec, suggest};
 
 /// Words that stand for the pipeline's own keys where a stage is named, and for no occlusion.
 const RESERVED: [&str; 4] = ["name", "seed", "stages", "none"];
@@ -92,11 +92,8 @@ impl Resolver {
 
     /// Puts a stage's twin before it, if it has one.
     fn twin(&mut self, id: &str, path: &str, stage: &StageSpec, plan: &StagePlan) -> Result<(), Invalid> {
-        let Some(twin) = stage.twin(plan, path, |index| Some(self.plan.stages[self.twin_of(index)?].id.clone()))?
-        else {
-            return Ok(());
-        };
-        let id = twin::named(id);
+        let twin_of = |index| Some(self.plan.stages[self.twin_of(index)?].id.clone());
+        let Some((id, twin)) = stage.twin(id, plan, path, twin_of)? else { return Ok(()) };
         if self.all_ids.contains(&id) || self.ids.contains_key(&id) {
             let message = format!("the stage's twin would be called `{id}`, as another is; give that another id");
             return Err(Invalid::new(path, message));

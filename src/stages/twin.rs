@@ -26,17 +26,18 @@ const PIXELS: u64 = 4;
 const SUFFIX: &str = "-3d";
 
 impl StageSpec {
-    /// The stage's twin, if what it works on has one; `twin_of` gives the name of that, by its place in the plan. `plan` is
-    /// the stage as understood, `path` where it is written.
+    /// The stage's twin and its name, if what it works on has one; `twin_of` gives the name of that, by its place in the plan.
+    /// `id` is the stage's name, `plan` the stage as understood, `path` where it is written.
     ///
     /// # Errors
     /// If there is to be one and can't be.
     pub(super) fn twin(
         &self,
+        id: &str,
         plan: &StagePlan,
         path: &str,
         twin_of: impl Fn(usize) -> Option<String>,
-    ) -> Result<Option<StageSpec>, Invalid> {
+    ) -> Result<Option<(String, StageSpec)>, Invalid> {
         let twin = match (self, plan) {
             (StageSpec::Scene(spec), _) if spec.twin == Some(true) => Some(StageSpec::Scene(of_scene(spec, path)?)),
             (StageSpec::Occlusion(spec), StagePlan::Occlusion(plan)) => match twin_of(plan.scene.index()) {
@@ -59,7 +60,7 @@ impl StageSpec {
             },
             _ => None,
         };
-        Ok(twin)
+        Ok(twin.map(|twin| (named(id), twin)))
     }
 }
 
@@ -71,7 +72,7 @@ impl Plan {
 }
 
 /// The name of a twin.
-pub(super) fn named(id: &str) -> String {
+fn named(id: &str) -> String {
     format!("{id}{SUFFIX}")
 }
 
