@@ -93,8 +93,14 @@ fn what_has_no_twin_is_refused() {
     let folder = Folder::with(FOUR);
     std::fs::write(folder.path("v.f32"), "").unwrap();
     for (set, words) in [
-        ("scene.objects[0]={duocylinder: {subdivisions: 3}}", "stages[0].scene.objects[0].duocylinder: has no twin in 3D; box, tesseract,"),
-        ("scene.objects[0]={isosurface: {field: {tiger: {major: [1, 1], minor: 0.5}}, grid: {cells: 4}}}", "isosurface.field.tiger: has no twin in 3D; box,"),
+        (
+            "scene.objects[0]={duocylinder: {subdivisions: 3}}",
+            "stages[0].scene.objects[0].duocylinder: has no twin in 3D; box, tesseract,",
+        ),
+        (
+            "scene.objects[0]={isosurface: {field: {tiger: {major: [1, 1], minor: 0.5}}, grid: {cells: 4}}}",
+            "isosurface.field.tiger: has no twin in 3D; box,",
+        ),
         ("scene.dimension=3", "scene.twin: a twin is a 3D scene beside a 4D one"),
         ("ao.load=v.f32", "occlusion.load: the file has the values of the 4D scene, and none of its twin"),
         ("plain.id=image-3d", "the stage's twin would be called `image-3d`, as another is"),
