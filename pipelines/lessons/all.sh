@@ -1,7 +1,7 @@
 #!/bin/sh
-# all   runs the ten lessons, into out/lesson-*, and writes their pictures where ParaView is installed:
+# all.sh   runs the ten lessons, into out/lesson-*, and writes their pictures where ParaView is installed:
 #
-#     pipelines/lessons/all
+#     pipelines/lessons/all.sh
 set -eu
 
 here=$(CDPATH='' cd "$(dirname "$0")" && pwd)
