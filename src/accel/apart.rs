@@ -32,8 +32,7 @@ pub(super) fn parts<const D: usize>(
     };
     let middle: Vector64<D> =
         Vector64::from_fn(|k, _| median(boxes.iter().map(|[low, high]| 0.5 * (low[k] + high[k])).collect()));
-    let reaches: Vec<f64> =
-        boxes.iter().map(|[low, high]| (low - middle).amax().max((high - middle).amax())).collect();
+    let reaches: Vec<f64> = boxes.iter().map(|[low, high]| (low - middle).amax().max((high - middle).amax())).collect();
     let mut reach = reaches.iter().copied().fold(0.0, f64::max);
     for _ in 0..TRIES {
         reach /= SHRINK;

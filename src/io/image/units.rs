@@ -78,7 +78,8 @@ impl Opened {
             let axis = &mut self.axes[axis];
             let own = std::mem::replace(&mut axis.unit, unit.clone()).unwrap_or_default();
             axis.positions.map(length / wanted, 0.0);
-            self.notes.push(format!("its axis \"{}\" is in {own}; it is brought to {common}, as \"{name}\" is", axis.name));
+            self.notes
+                .push(format!("its axis \"{}\" is in {own}; it is brought to {common}, as \"{name}\" is", axis.name));
         }
         self
     }

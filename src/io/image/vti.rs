@@ -64,7 +64,9 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
     (opened.origin, opened.has_times) = (origin, time.is_some());
     if missing > 0 {
         let what = if on_cells { "cells" } else { "points" };
-        opened.notes.push(format!("{missing} of its {what} are marked as hidden or not valid; their values are no numbers"));
+        opened
+            .notes
+            .push(format!("{missing} of its {what} are marked as hidden or not valid; their values are no numbers"));
     }
     Ok(opened)
 }
