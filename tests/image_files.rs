@@ -800,6 +800,34 @@ fn files_of_a_sequence_share_one_grid() {
     is_placed(at, counted, 0.0, [2.0, 1.0, 0.5, 1.0], [10.0, 20.0, 30.0, 7.0]);
     write(3, "Origin=\"10 20 30\" Spacing=\"2 1 1\"", Some(16.0));
     is_refused(at, files.clone(), &["a3.vti", "along z", "a0.vti"]);
+    // What nobody asks for may be of any kind, and may be damaged.
+    let odd = [
+        ("<Array type=\"String\" Name=\"s\" format=\"ascii\">65 0</Array>", true),
+        ("<DataArray type=\"Int8\" Name=\"m\" format=\"ascii\">1</DataArray>", false),
+    ];
+    for (array, without_name) in odd {
+        let text = std::fs::read_to_string(at.join("a0.vti"))
+            .unwrap()
+            .replace("</PointData>", &format!("{array}</PointData>"));
+        std::fs::write(at.join("odd.vti"), text).unwrap();
+        try_build::<3>(at, json!({"file": "odd.vti", "array": "f"}), 0.0).unwrap();
+        assert_eq!(try_build::<3>(at, json!({"file": "odd.vti"}), 0.0).is_ok(), without_name, "{array}");
+        is_refused(
+            at,
+            json!({"file": "odd.vti", "array": "g"}),
+            &[if without_name { "there are f" } else { "array `m`" }],
+        );
+    }
+    // Values of cells lie at their middles.
+    let cells = std::fs::read_to_string(at.join("a0.vti")).unwrap().replace("0 8 0 7 0 6", "0 9 0 8 0 7");
+    let text = "<Array type=\"String\" Name=\"s\" format=\"ascii\">65 0</Array><DataArray type=\"Int8\" Name=\"m\" format=\"ascii\">1</DataArray>";
+    let cells = cells.replace("PointData>", "CellData>").replace("<FieldData>", &format!("<FieldData>{text}"));
+    std::fs::write(at.join("cells.vti"), cells).unwrap();
+    let opened = ao4d::io::image::open("", at, &["cells.vti".into()], &Default::default()).unwrap();
+    assert_eq!(
+        opened.axes.each_ref().map(|axis| (axis.size, axis.positions.at(0))),
+        [(9, 11.0), (8, 20.5), (7, 30.25), (1, 7.0)]
+    );
     // Points that are hidden, or lie outside of what was resampled, have no value.
     let whole = std::fs::read_to_string(at.join("a0.vti")).unwrap();
     for (name, usual, odd) in [("vtkGhostType", "1", "3"), ("vtkValidPointMask", "1", "0")] {

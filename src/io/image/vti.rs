@@ -5,7 +5,7 @@ use std::path::Path;
 use super::axes::{Axis, Opened, Positions, Role};
 use super::numbers::Held;
 use super::{Request, room_for};
-use crate::io::vtk::{self, DataSet};
+use crate::io::vtk::{self, DataSet, Wanted};
 use crate::volume::Array;
 
 /// Arrays that VTK adds of its own accord, to say which points count.
@@ -17,13 +17,14 @@ const HIDDEN_CELL: u64 = 32;
 
 pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened, String> {
     room_for(length.saturating_mul(2), "this format is read as a whole")?;
-    let image = vtk::read(path).map_err(|error| {
-        // The error names the file, as whoever asked does.
-        let text = error.to_string();
-        text.strip_prefix(&format!("{}: ", path.display())).map_or(text.clone(), str::to_owned)
-    })?;
-    let DataSet::Image(image) = image else {
-        return Err("holds a mesh, not an image; resample it to an image (in ParaView: Resample To Image)".into());
+    let image = match request.array.as_deref() {
+        // What nobody asked for refuses nothing.
+        Some(name) => {
+            let image = read(path, Wanted::Named(&[&[name, "TimeValue"][..], &VTKS_OWN].concat()))?;
+            let there = image.point_arrays.iter().chain(&image.cell_arrays).any(|array| array.name == name);
+            if there { image } else { read(path, Wanted::Numbers)? }
+        }
+        None => read(path, Wanted::Numbers)?,
     };
     let (array, on_cells) = choose(&image, request.array.as_deref())?;
     let direction =
@@ -69,6 +70,20 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
             .push(format!("{missing} of its {what} are marked as hidden or not valid; their values are no numbers"));
     }
     Ok(opened)
+}
+
+fn read(path: &Path, wanted: Wanted<'_>) -> Result<vtk::Image, String> {
+    let data = vtk::read_wanted(path, wanted).map_err(|error| {
+        // The error names the file, as whoever asked does.
+        let text = error.to_string();
+        text.strip_prefix(&format!("{}: ", path.display())).map_or(text.clone(), str::to_owned)
+    })?;
+    match data {
+        DataSet::Image(image) => Ok(image),
+        DataSet::Unstructured(_) => {
+            Err("holds a mesh, not an image; resample it to an image (in ParaView: Resample To Image)".into())
+        }
+    }
 }
 
 /// Which points or cells have no value: those that are hidden, and those that lay outside of what was resampled.
