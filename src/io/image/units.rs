@@ -3,7 +3,7 @@
 //! A microscope's file may give x in nanometres and z in micrometres. As bare numbers they would make another body. What is no
 //! length, such as degrees or hectopascals, has no common measure with one, and stays as it is.
 
-use super::axes::{Opened, Role};
+use super::axes::{Axis, Opened, Role};
 
 /// How many metres a unit is; none if it is no length that is known.
 pub(super) fn metres(unit: &str) -> Option<f64> {
@@ -63,14 +63,14 @@ pub(super) fn same(one: &str, other: &str) -> bool {
 }
 
 impl Opened {
-    /// Brings x, y and z to one unit of length.
+    /// Brings all axes of lengths to one unit.
     pub(super) fn in_one_unit(mut self) -> Self {
-        let of = |opened: &Self, role: Role| {
-            let axis = opened.axes.iter().position(|axis| axis.role == Some(role))?;
-            Some((axis, metres(opened.axes[axis].unit.as_deref()?)?))
+        let length = |axis: &Axis| match axis.role {
+            Some(Role::Time | Role::Channel) => None,
+            _ => metres(axis.unit.as_deref()?),
         };
         let lengths: Vec<(usize, f64)> =
-            [Role::X, Role::Y, Role::Z].into_iter().filter_map(|role| of(&self, role)).collect();
+            self.axes.iter().enumerate().filter_map(|(i, axis)| Some((i, length(axis)?))).collect();
         let Some(&(first, wanted)) = lengths.first() else { return self };
         let unit = self.axes[first].unit.clone();
         for (axis, length) in lengths.into_iter().filter(|(_, length)| *length != wanted) {
