@@ -22,7 +22,9 @@ pub fn turned(points: &[Vector64<3>], mut triangles: Vec<[u32; 3]>) -> Vec<[u32;
     // Which triangle has an edge in this direction; none where several have it.
     let mut edges: HashMap<[u32; 2], Option<usize>> = HashMap::new();
     for (i, triangle) in triangles.iter().enumerate() {
-        sides(*triangle).map(|edge| edges.entry(edge).and_modify(|known| *known = None).or_insert(Some(i)));
+        for edge in sides(*triangle) {
+            edges.entry(edge).and_modify(|known| *known = None).or_insert(Some(i));
+        }
     }
     for _ in 0..ROUNDS {
         let before = slivers.len();
@@ -41,7 +43,7 @@ pub fn turned(points: &[Vector64<3>], mut triangles: Vec<[u32; 3]>) -> Vec<[u32;
             edges.remove(&[a, b]);
             edges.remove(&[b, a]);
             for (triangle, place) in [(one, i), (two, other)] {
-                sides(triangle).map(|edge| edges.insert(edge, Some(place)));
+                edges.extend(sides(triangle).map(|edge| (edge, Some(place))));
             }
             false
         });
