@@ -69,8 +69,10 @@ impl Opened {
             Some(Role::Time | Role::Channel) => None,
             _ => metres(axis.unit.as_deref()?),
         };
-        let lengths: Vec<(usize, f64)> =
+        let mut lengths: Vec<(usize, f64)> =
             self.axes.iter().enumerate().filter_map(|(i, axis)| Some((i, length(axis)?))).collect();
+        // The unit of x, however the axes are stored.
+        lengths.sort_by_key(|&(i, _)| self.axes[i].role.map_or(Role::Channel as usize, |role| role as usize));
         let Some(&(first, wanted)) = lengths.first() else { return self };
         let unit = self.axes[first].unit.clone();
         for (axis, length) in lengths.into_iter().filter(|(_, length)| *length != wanted) {
