@@ -149,11 +149,11 @@ fn scenes<const D: usize>() {
     // Something far away, and a floor that reaches as far: what lies together is met as without them.
     for far in [1e6, 1e12, 1e25] {
         for floor in [false, true] {
-            let mut scene = soup::<D>(1, 150, 0.3, false);
+            let mut scene = soup::<D>(1, 60, 0.6, false);
             let mut other = soup::<D>(9, 2, 1.0, false);
             if floor {
                 other = soup::<D>(9, 1, 1.0, false);
-                // Axes to all sides, 2 below the scene; what is left of the last axis keeps it from being flat.
+                // To all sides, nearly level, 2 below the middle of the scene.
                 other.vertices.iter_mut().for_each(|v| *v = v.map(|x| x * far));
                 other.vertices.iter_mut().for_each(|v| v[D - 1] = v[D - 1].mul_add(1e-3 / far, -2.0));
             }
