@@ -11,7 +11,7 @@ const SHRINK: f64 = 4.0;
 /// How often: beyond this there is no single precision.
 const TRIES: usize = 64;
 
-/// The simplices that lie together and those that lie apart, if there are such parts; in the order in which they are given.
+/// The simplices that lie together and those that lie apart, of which there may be none, if there are such parts; in the order in which they are given.
 /// Most of the former have sides of more than `coarse` widths of what holds them all.
 pub(super) fn parts<const D: usize>(
     simplices: &[u32],
@@ -35,7 +35,6 @@ pub(super) fn parts<const D: usize>(
     let reaches: Vec<f64> = boxes.iter().map(|[low, high]| (low - middle).amax().max((high - middle).amax())).collect();
     let mut reach = reaches.iter().copied().fold(0.0, f64::max);
     for _ in 0..TRIES {
-        reach /= SHRINK;
         let sides: Vec<f64> = boxes
             .iter()
             .zip(&reaches)
@@ -51,6 +50,7 @@ pub(super) fn parts<const D: usize>(
             let indices = |part: Vec<(u32, f64)>| part.into_iter().map(|(simplex, _)| simplex).collect();
             return Some((indices(near), indices(far)));
         }
+        reach /= SHRINK;
     }
     None
 }
@@ -79,6 +79,8 @@ mod tests {
         }
         let (near, far) = taken(&[(1e9, 0.5), (5.0, 1e20)]).unwrap();
         assert_eq!((near.len(), far), (100, vec![50, 51]));
+        // All lie together, where only vertices without a simplex are far away.
+        assert_eq!(taken(&[]).map(|(near, far)| (near.len(), far.len())), Some((100, 0)));
         // As many far away as near.
         let many: Vec<(f32, f32)> = (0..100).map(|i| (1e9 + 1e3 * i as f32, 0.5)).collect();
         assert_eq!(taken(&many), None);

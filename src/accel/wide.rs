@@ -120,6 +120,8 @@ pub struct WideBvh<const D: usize> {
     fine: bool,
     /// What lies apart, and is in none of the nodes and leaves.
     pub far: Bvh<D>,
+    /// Whether the coordinates are those of a part of the scene.
+    of_part: bool,
 }
 
 /// What becomes of the nodes of the binary tree.
@@ -165,7 +167,7 @@ impl<const D: usize> WideBvh<D> {
         let Some((near, far)) = apart::parts(&bvh.order, bounds, COARSE * GROWTH) else { return whole };
         let near = Bvh::build(&near, bounds, parallel);
         let scale = Scale::around(&near.nodes[0].bounds);
-        Self { far: Bvh::build(&far, bounds, parallel), ..Self::over(&near, mesh, scale, parallel) }
+        Self { far: Bvh::build(&far, bounds, parallel), of_part: true, ..Self::over(&near, mesh, scale, parallel) }
     }
 
     /// Of what is in the binary tree, in coordinates of this scale.
@@ -178,6 +180,7 @@ impl<const D: usize> WideBvh<D> {
             total: mesh.simplices.len(),
             fine: true,
             far: Bvh::default(),
+            of_part: false,
         };
         if bvh.nodes.is_empty() {
             return wide;
@@ -225,9 +228,9 @@ impl<const D: usize> WideBvh<D> {
             && self.is_near(point)
     }
 
-    /// Whether these simplices, too, lie where the coordinates of the leaves are made for. All do, where nothing lies apart.
+    /// Whether these simplices, too, lie where the coordinates of the leaves are made for.
     pub fn holds(&self, simplices: &[u32], mesh: &Mesh<D>) -> bool {
-        self.far.nodes.is_empty() || simplices.iter().all(|&s| mesh.corners(s).iter().all(|v| self.is_near(v)))
+        !self.of_part || simplices.iter().all(|&s| mesh.corners(s).iter().all(|v| self.is_near(v)))
     }
 
     fn is_near(&self, point: &Vector<D>) -> bool {
