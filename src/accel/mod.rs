@@ -1,6 +1,7 @@
 //! Bounding volume hierarchies over the simplices of a mesh, and the two questions asked of them: which simplex does
 //! a ray hit first, and does it hit any.
 
+mod apart;
 mod build;
 mod bvh;
 mod node;
