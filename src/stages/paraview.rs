@@ -271,7 +271,7 @@ fn add_object(resolver: &mut Resolver, write: Ref<WritePlan>) {
 
 /// The state's text.
 fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
-    let dark = |write: Ref<WritePlan>| plan[plan[write].render].occlusion.is_some();
+    let dark = |write: Ref<WritePlan>| plan[plan[write].render].is_dark();
     let mixed = figure.writes.len() == 2 && figure.writes.iter().filter(|&&write| dark(write)).count() == 1;
     let mut panels = Vec::with_capacity(figure.writes.len());
     for &write in &figure.writes {
@@ -281,10 +281,10 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             Dimension::Four => camera::<4>(&render.camera)?.grid(render.dimensions),
         };
         let file = plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref());
-        let caption = match (figure.writes.len(), render.occlusion) {
+        let caption = match (figure.writes.len(), render.is_dark()) {
             (1, _) => String::new(),
-            (2, Some(_)) if mixed => "with ambient occlusion".to_owned(),
-            (2, None) if mixed => "without ambient occlusion".to_owned(),
+            (2, true) if mixed => "with ambient occlusion".to_owned(),
+            (2, false) if mixed => "without ambient occlusion".to_owned(),
             _ => plan.id(plan[write].render).replace(['-', '_'], " "),
         };
         panels.push(paraview::Panel { file: beside(&figure.state, file), caption, grid });

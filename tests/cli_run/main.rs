@@ -8,6 +8,7 @@ mod limits;
 mod mesh;
 mod pictures;
 mod provenance;
+mod shade;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
