@@ -220,7 +220,8 @@ fn every_key_counts_or_has_a_reason() {
 fn every_object_s_field_counts() {
     let folder = tempfile::tempdir().unwrap();
     let before = keys(folder.path(), PIPELINE, &[]);
-    let all: BTreeSet<String> = before.keys().cloned().collect();
+    // But for an image that is there already.
+    let all: BTreeSet<String> = before.keys().filter(|file| *file != "s.vti").cloned().collect();
     for set in [
         "s.objects[0].name=two",
         "s.objects[0].color=[1, 0, 0.5]",

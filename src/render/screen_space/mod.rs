@@ -27,8 +27,9 @@ use crate::volume::Grid;
 
 /// What a point must rise above another's tangent plane to hide anything from it, as a sine: more than rounding does.
 const LEAST_RISE: f32 = 1e-3;
-/// The part of the diagonal of all that is seen that things are taken to be thick, where nothing else is said.
-const THICK: f32 = 0.15;
+/// How thick things are taken to be where nothing else is said, as a part of the extent of all that is seen. Found on two
+/// scenes, where errors are least at 0.32 and 0.48 and hardly more between.
+const THICK: f32 = 0.36;
 
 /// How screen space is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +47,7 @@ pub struct ScreenSpace {
 /// How far things go on behind what is seen of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Thickness {
-    /// A part of the extent of all that is seen.
+    /// A part of the extent of all that is seen: of the mean side of the box around it.
     Auto,
     /// So far, in the scene's units; infinite means plain horizons.
     Given(f32),
@@ -108,7 +109,7 @@ impl<const D: usize> DepthImage<D> {
         });
         image.ahead = distances;
         image.thickness = match settings.thickness {
-            Thickness::Auto => THICK * image.diagonal(),
+            Thickness::Auto => THICK * image.extent(),
             Thickness::Given(thickness) => thickness,
         };
         image
@@ -174,8 +175,8 @@ impl<const D: usize> DepthImage<D> {
         if self.camera.is_parallel() { Vector::from_fn(|r, _| f32::from(r == D - 1)) } else { -point / point.norm() }
     }
 
-    /// The diagonal of the box around all that is seen.
-    fn diagonal(&self) -> f32 {
+    /// The side of the cube that is as large as the box around all that is seen.
+    fn extent(&self) -> f32 {
         let [width, height, _] = self.dimensions;
         let empty = || (Vector::<D>::repeat(f32::INFINITY), Vector::<D>::repeat(f32::NEG_INFINITY));
         let grow = |(low, high): (Vector<D>, Vector<D>), n: usize| match self.shown([
@@ -189,7 +190,8 @@ impl<const D: usize> DepthImage<D> {
         let join = |a: (Vector<D>, Vector<D>), b: (Vector<D>, Vector<D>)| (a.0.inf(&b.0), a.1.sup(&b.1));
         let all = (0..self.ahead.len()).into_par_iter().with_min_len(4096);
         let (low, high) = all.fold(empty, grow).reduce(empty, join);
-        if low[0] <= high[0] { (high - low).norm() } else { 0.0 }
+        let volume: f64 = (high - low).iter().map(|&side| f64::from(side.max(0.0))).product();
+        libm::pow(volume, 1.0 / D as f64) as f32
     }
 
     /// What is open at a point with this normal, both in the camera's frame.

@@ -92,9 +92,10 @@ fn a_right_angle_is_half_open() {
     for projection in [PERSPECTIVE, PARALLEL] {
         for thickness in [Thickness::Auto, Thickness::Given(f32::INFINITY)] {
             let settings = ScreenSpace { thickness, ..ScreenSpace::default() };
-            let (three, four) = (corner::<3>(projection, 400, settings), corner::<4>(projection, 100, settings));
+            let (three, four) = (corner::<3>(projection, 400, settings), corner::<4>(projection, 64, settings));
             println!("{projection:?} {thickness:?}: {three} {four}");
-            assert!((three - 0.5).abs() < 0.01 && (four - 0.5).abs() < 0.015, "{projection:?}: {three} {four}");
+            // What is missing of the walls lies outside of the image: less, the nearer a voxel is to the corner.
+            assert!((three - 0.5).abs() < 0.005 && (four - 0.5).abs() < 0.02, "{projection:?}: {three} {four}");
         }
         // What is further away than the corner's own voxels doesn't count.
         let near = ScreenSpace { max_distance: 1e-3, ..ScreenSpace::default() };
@@ -165,7 +166,7 @@ fn picture<const D: usize>(shading: Shading, across: usize, slab: usize) -> Vec<
 }
 
 fn rays_agree<const D: usize>(across: usize, most: f64) {
-    let rays = picture::<D>(Shading::Voxel(Estimator::Sampled(Sampling::new(256, 1))), across, across);
+    let rays = picture::<D>(Shading::Voxel(Estimator::Sampled(Sampling::new(128, 1))), across, across);
     let settings = ScreenSpace { thickness: Thickness::Given(0.4), ..ScreenSpace::default() };
     let space = picture::<D>(Shading::ScreenSpace(settings), across, across);
     let squares: f64 = rays.iter().zip(&space).map(|(a, b)| f64::from(a - b).powi(2)).sum();
@@ -182,6 +183,6 @@ fn rays_agree<const D: usize>(across: usize, most: f64) {
 
 #[test]
 fn screen_space_sees_what_rays_see_in_any_slabs_on_any_threads() {
-    rays_agree::<3>(60, 0.02);
-    rays_agree::<4>(20, 0.02);
+    rays_agree::<3>(40, 0.02);
+    rays_agree::<4>(16, 0.02);
 }
