@@ -8,12 +8,12 @@ use super::{Folder, PIPELINE, info, names};
 
 /// Pictures that tell depth and normals, by both projections and in both dimensions.
 const PICTURES: &str = "
-  - render: {id: near, input: scene, occlusion: screen_space, dimensions: [14, 12, 10], dilate: 0}
+  - render: {id: near, input: scene, occlusion: screen_space, dimensions: [14, 12, 10], dilate: 0, supersample: 1}
   - write: {vti: near.vti, arrays: [depth, normal, opacity, ambient_occlusion]}
-  - render: {id: far, input: scene, occlusion: screen_space, dimensions: [14, 12, 10], dilate: 0, camera: {projection: parallel, height: 3}}
+  - render: {id: far, input: scene, occlusion: screen_space, dimensions: [14, 12, 10], dilate: 0, supersample: 1, camera: {projection: parallel, height: 3}}
   - write: {vti: far.vti, arrays: [depth, normal, opacity, ambient_occlusion]}
   - scene: {id: flat, dimension: 3, objects: [{box: {min: [-1, -1, -2], max: [1, 1, -1]}}, {box: {min: [-0.4, -0.4, -1], max: [0.4, 0.4, -0.5]}}]}
-  - render: {id: flat-image, input: flat, occlusion: screen_space, dimensions: [60, 50]}
+  - render: {id: flat-image, input: flat, occlusion: screen_space, dimensions: [60, 50], supersample: 1}
   - write: {vti: flat.vti, arrays: [depth, normal, opacity, ambient_occlusion]}
 ";
 
