@@ -157,7 +157,7 @@ fn check_resources(pipeline: &Pipeline, book: &Book) -> Result<(), RunError> {
         && *memory > available
     {
         let name = format!("{} {}", plan.kind(*stage), plan.stages[*stage].id);
-        return Err(RunError::Memory { stage: name, holds: *holds, needed: *memory, available });
+        return Err(RunError::Memory { stage: name, holds, needed: *memory, available });
     }
     let disk = needs.iter().fold(0, |sum: u64, (needs, _)| sum.saturating_add(needs.disk));
     Ok(io::check_free_space(&plan.out, disk)?)
