@@ -253,7 +253,8 @@ def show_solids(panels, readers, arrays, views, centre, shape):
     bodies = [bodies_of(reader, name) for reader, name in zip(readers, names)]
     for body in bodies:
         body.UpdatePipeline()
-    box = (frame_over_time(panels, readers) if FRAMES else frame_of(bodies)) or union_of([grid_bounds(panel) for panel in panels])
+    box = frame_over_time(panels, readers) if FRAMES else frame_of(bodies)
+    box = box or union_of([grid_bounds(panel) for panel in panels])
     cuts = [cut_open(body, name, centre, box) for body, name in zip(bodies, names)]
     if CUT is not None:
         link_cuts(cuts)

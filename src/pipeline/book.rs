@@ -70,6 +70,11 @@ impl Book {
         outputs.any(|output| self.stale.contains(&output.file))
     }
 
+    /// Whether any file of a stage has to be made.
+    pub fn needs_stage(&self, stage: usize) -> bool {
+        self.outputs[stage].iter().any(|output| self.stale.contains(&output.file))
+    }
+
     /// From here on files are made of this scene, of which this is to be told.
     pub fn begin_scene(&mut self, notes: Vec<String>) {
         self.tell(&notes);

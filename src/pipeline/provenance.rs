@@ -151,6 +151,7 @@ stages:
   - render: {id: few, occlusion: t, input: t, dimensions: [4, 4, 4], shading: auto}
   - render: {id: flat, occlusion: a, dimensions: [4, 4, 4], shading: flat}
   - render: {id: none, occlusion: none, dimensions: [4, 4, 4]}
+  - render: {id: space, occlusion: screen_space, dimensions: [4, 4, 4]}
   - write: {vti: a.vti}
   - write: {input: few, png: a.png}
   - mesh: {vtu: mesh.vtu}

@@ -6,7 +6,8 @@
 //! 1. [`visibility`]: the simplex that the ray through each voxel's centre, or through each of its samples, hits first;
 //! 2. `surface`: the point that a voxel shows, and how [`Lighting`] lights it, into the columns of the [`GBuffer`] that
 //!    somebody asked for;
-//! 3. `occlude`: ambient occlusion at those points, where it does not come from the vertices;
+//! 3. `occlude`: ambient occlusion at those points, where it does not come from the vertices; or [`screen_space`], which
+//!    looks for it in the image alone;
 //! 4. [`filters`]: what looks at neighbouring voxels;
 //! 5. [`Aov`]: the columns as the numbers of an array, for each array that somebody asked for.
 
@@ -19,6 +20,7 @@ mod light;
 mod occlude;
 mod renderer;
 mod samples;
+pub mod screen_space;
 mod shading;
 mod surface;
 pub mod tone;
@@ -31,5 +33,6 @@ pub use gbuffer::{Columns, GBuffer};
 pub use light::{DepthCue, Light, Lighting, Source};
 pub use renderer::{Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
+pub use screen_space::{DepthImage, ScreenSpace, Thickness};
 pub use shading::Shading;
 pub use visibility::{NOTHING, Visibility};

@@ -8,10 +8,13 @@ use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
 use super::samples::Sampling;
 use super::surface::SurfacePass;
-use super::{Accuracy, Aov, Camera, Lighting, NOTHING, Shading, Visibility, occlude, visibility};
+use super::{
+    Accuracy, Aov, Camera, DepthImage, Lighting, NOTHING, ScreenSpace, Shading, Visibility, occlude, screen_space,
+    visibility,
+};
 use crate::accel::Tracer;
 use crate::occlusion::Error;
-use crate::progress::Progress;
+use crate::progress::{Progress, Uncounted};
 use crate::trace::{self, RayBackend};
 use crate::volume::{Array, Grid, Volume};
 
@@ -87,6 +90,10 @@ impl<const D: usize> Renderer<D> {
         let sampling = Sampling::new(&self.camera, &self.grid, self.supersample);
         let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
         let columns = self.columns(aovs);
+        let depth_image = match self.shading {
+            Shading::ScreenSpace(settings) => Some(self.depth_image(settings, progress)?),
+            _ => None,
+        };
         let pass = SurfacePass {
             tracer: self.tracer(),
             camera: &self.camera,
@@ -106,7 +113,10 @@ impl<const D: usize> Renderer<D> {
                     buffer.interpolated.copy_from_slice(&buffer.occlusion);
                     occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?;
                 }
-                Shading::None | Shading::Flat(_) | Shading::Smooth(_) => {}
+                Shading::None | Shading::Flat(_) | Shading::Smooth(_) | Shading::ScreenSpace(_) => {}
+            }
+            if let Some(image) = &depth_image {
+                screen_space::occlude(image, &mut buffer, progress)?;
             }
             Ok(buffer)
         };
@@ -139,6 +149,30 @@ impl<const D: usize> Renderer<D> {
         Ok(Volume { grid: self.grid, arrays, field_data: Vec::new() })
     }
 
+    /// What the voxels' centres see, as far as screen space looks at it; made slab by slab too.
+    fn depth_image(&self, settings: ScreenSpace, progress: &dyn Progress) -> Result<DepthImage<D>, Error> {
+        let sampling = Sampling::new(&self.camera, &self.grid, 1);
+        let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
+        let pass = SurfacePass {
+            tracer: self.tracer(),
+            camera: &self.camera,
+            sampling: &sampling,
+            visibility: &visibility,
+            shading: &Shading::None,
+            lighting: None,
+        };
+        let columns = Columns::SIMPLEX | Columns::DEPTH;
+        let [_, _, layers] = self.grid.dimensions;
+        let voxel = columns.bytes::<D>() + size_of::<u32>();
+        let thickness = (SLAB_BYTES / voxel / self.grid.layer_len().max(1)).clamp(1, layers);
+        let mut distances = Vec::with_capacity(self.grid.len());
+        for first in (0..layers).step_by(thickness) {
+            let slab = pass.layers(first..layers.min(first + thickness), columns, &Uncounted(progress))?;
+            distances.extend(slab.depth);
+        }
+        Ok(DepthImage::new(&self.camera, &self.grid, distances, settings))
+    }
+
     /// The columns that arrays and filters need.
     fn columns(&self, aovs: &[Aov]) -> Columns {
         let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
@@ -167,6 +201,7 @@ fn columns(shading: &Shading, aovs: &[Aov]) -> Columns {
     let point = match shading {
         Shading::Voxel(_) => occlude::COLUMNS,
         Shading::Auto(..) => occlude::COLUMNS | Columns::OCCLUSION | Columns::INTERPOLATED,
+        Shading::ScreenSpace(_) => screen_space::COLUMNS,
         Shading::None | Shading::Flat(_) | Shading::Smooth(_) => Columns::SIMPLEX,
     };
     aovs.iter().fold(point, |all, aov| all | aov.columns())

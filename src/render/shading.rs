@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::ScreenSpace;
 use crate::occlusion::{Estimates, Estimator};
 
 /// Where the ambient occlusion of a visible point comes from.
@@ -18,6 +19,8 @@ pub enum Shading {
     /// Interpolated, and mended by how far that is off: by few rays at the point itself, whose difference from the
     /// interpolated value is denoised.
     Auto(Arc<Estimates>, Estimator),
+    /// Guessed from the depth and the normals of the image itself, without rays.
+    ScreenSpace(ScreenSpace),
 }
 
 impl Shading {

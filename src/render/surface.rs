@@ -210,7 +210,7 @@ impl<const D: usize> SurfacePass<'_, D> {
         let (estimates, weights) = match self.shading {
             Shading::Flat(estimates) => (estimates, &equal),
             Shading::Smooth(estimates) | Shading::Auto(estimates, _) => (estimates, &hit.crossing.barycentric),
-            Shading::None | Shading::Voxel(_) => return (1.0, 0.0),
+            Shading::None | Shading::Voxel(_) | Shading::ScreenSpace(_) => return (1.0, 0.0),
         };
         let value = match self.shading {
             Shading::Flat(_) => (0..D).map(|i| corner(&estimates.values, i)).sum::<f64>() / D as f64,

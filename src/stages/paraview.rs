@@ -409,7 +409,7 @@ fn add_object(resolver: &mut Resolver, shown: Shown) {
 
 /// The state's text.
 fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
-    let dark = |shown: Shown| plan[shown.render(plan)].occlusion.is_some();
+    let dark = |shown: Shown| plan[shown.render(plan)].is_dark();
     let twins = figure.writes.len() == 2 && plan.is_twin(figure.writes[0].index());
     let mixed = figure.writes.len() == 2 && figure.writes.iter().filter(|&&write| dark(write)).count() == 1;
     let mut panels = Vec::with_capacity(figure.writes.len());
@@ -423,11 +423,11 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             Shown::Image(write) => plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref()),
             Shown::Animation(animation) => &plan[animation].list,
         };
-        let caption = match (figure.writes.len(), render.occlusion) {
+        let caption = match (figure.writes.len(), render.is_dark()) {
             (1, _) => String::new(),
             (2, _) if twins => if plan.is_twin(write.index()) { "in 3D" } else { "in 4D" }.to_owned(),
-            (2, Some(_)) if mixed => "with ambient occlusion".to_owned(),
-            (2, None) if mixed => "without ambient occlusion".to_owned(),
+            (2, true) if mixed => "with ambient occlusion".to_owned(),
+            (2, false) if mixed => "without ambient occlusion".to_owned(),
             _ => match write {
                 Shown::Image(write) => plan.id(plan[write].render),
                 Shown::Animation(animation) => plan.id(animation),

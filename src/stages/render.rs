@@ -17,6 +17,7 @@ use super::describe::{Counts, Totals, grouped};
 use super::lighting::{self, DepthCueSpec, LightSpec, LightingKeys, LightingPlan};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::scene::ScenePlan;
+use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
 use super::subject::scene_and_occlusion;
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
@@ -53,8 +54,11 @@ pub struct RenderSpec {
     pub id: Option<String>,
     /// The scene, or the occlusion (and with it its scene), by its id.
     pub input: Option<String>,
-    /// The occlusion that darkens the image, by its id; `none` renders without (default: the nearest earlier one, if any).
+    /// The occlusion that darkens the image, by its id; `none` renders without; `screen_space` looks for it in the image
+    /// itself, without rays (default: the nearest earlier one, if any).
     pub occlusion: Option<String>,
+    /// With `occlusion: screen_space`: how it is looked for.
+    pub screen_space: Option<ScreenSpaceSpec>,
     /// Where it is seen from.
     pub camera: Option<CameraSpec>,
     /// Voxels along x, y and z; in 3D pixels along x and y.
@@ -115,8 +119,10 @@ pub enum Shading {
 pub struct RenderPlan {
     /// The scene it shows.
     pub scene: Ref<ScenePlan>,
-    /// The occlusion that darkens it; none renders without.
+    /// The occlusion that darkens it; none renders without, or looks for it in the image.
     pub occlusion: Option<Ref<OcclusionPlan>>,
+    /// How occlusion is looked for in the image itself, if it is.
+    pub screen_space: Option<ScreenSpacePlan>,
     /// Where it is seen from.
     pub camera: CameraPlan,
     /// Voxels along x, y and z; one layer in 3D.
@@ -153,6 +159,11 @@ impl RenderSpec {
 }
 
 impl RenderPlan {
+    /// Whether anything darkens it.
+    pub fn is_dark(&self) -> bool {
+        self.occlusion.is_some() || self.screen_space.is_some()
+    }
+
     /// The number of voxels.
     pub fn voxels(&self) -> u64 {
         self.dimensions.iter().map(|&d| d as u64).product()
@@ -175,15 +186,16 @@ impl Stage for RenderPlan {
     }
 
     fn resolve(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let (input, named) = (spec.input.as_deref(), spec.occlusion.as_deref());
-        let (scene, occlusion) = scene_and_occlusion(resolver, path, input, named)?;
+        let screen_space = screen_space(spec, path, resolver)?;
+        let named = spec.occlusion.as_deref().map(|word| if screen_space.is_some() { "none" } else { word });
+        let (scene, occlusion) = scene_and_occlusion(resolver, path, spec.input.as_deref(), named)?;
         let dimension = resolver.plan[scene].dimension;
         let blank = CameraSpec::default();
         let camera_spec = spec.camera.as_ref().unwrap_or(&blank);
         let warnings = &mut resolver.plan.warnings;
         let camera = camera::plan(camera_spec, &format!("{path}.camera"), dimension, warnings)?;
         let default = occlusion.map_or(Shading::Smooth, |o| resolver.plan[o].default_shading());
-        let shading = spec.shading.unwrap_or(default);
+        let shading = spec.shading.filter(|_| screen_space.is_none()).unwrap_or(default);
         let refusal = match occlusion.map(|o| &resolver.plan[o].source).filter(|_| shading == Shading::Voxel) {
             Some(OcclusionSource::Load(_)) => Some(
                 "`voxel` computes occlusion at the visible points, which a loaded file has no values for".to_owned(),
@@ -242,6 +254,7 @@ impl Stage for RenderPlan {
         Ok(Self {
             scene,
             occlusion,
+            screen_space,
             camera,
             dimensions,
             shading,
@@ -272,10 +285,13 @@ impl Stage for RenderPlan {
         let render = &plan[me];
         let mut written = json!({
             "camera": render.camera.written(),
-            "shading": render.shading,
             "supersample": render.supersample,
             "dilate": render.dilate,
         });
+        match &render.screen_space {
+            Some(screen_space) => written["screen_space"] = screen_space.written(),
+            None => written["shading"] = json!(render.shading),
+        }
         if let (Some(lighting), Some(written)) = (&render.lighting, written.as_object_mut()) {
             written.extend(lighting.written());
         }
@@ -294,7 +310,7 @@ impl Stage for RenderPlan {
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == me) {
             aovs.extend(write.stale(Content::Voxels, stale).into_iter().flat_map(|file| file.format.arrays(write)));
         }
-        Needs { memory: if aovs.is_empty() { 0 } else { render.memory(plan, &aovs) }, disk: 0 }
+        if aovs.is_empty() { Needs::default() } else { render.memory(plan, &aovs) }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
@@ -302,8 +318,10 @@ impl Stage for RenderPlan {
         let [x, y, z] = render.dimensions;
         let with = match render.occlusion {
             Some(occlusion) => format!("with {}", plan.id(occlusion)),
+            None if render.screen_space.is_some() => "with occlusion in screen space".into(),
             None => "without occlusion".into(),
         };
+        let shading = render.screen_space.map_or(render.shading.as_str().to_owned(), |space| space.line());
         let projection = match render.camera.projection {
             ProjectionPlan::Perspective { field_of_view } => format!("perspective {field_of_view} degrees"),
             ProjectionPlan::Parallel { height } => format!("parallel, height {height}"),
@@ -313,7 +331,7 @@ impl Stage for RenderPlan {
             Dimension::Four => format!("{x} x {y} x {z}"),
         };
         let (scene, voxels) = (plan.id(render.scene), grouped(render.voxels()));
-        format!("{scene} {with}: {extent} = {voxels} voxels, {}, {projection}", render.shading.as_str())
+        format!("{scene} {with}: {extent} = {voxels} voxels, {shading}, {projection}")
     }
 
     fn totals(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> Totals {
@@ -363,7 +381,7 @@ impl Stage for RenderPlan {
 
 impl RenderPlan {
     /// The memory of a slab of one layer with these arrays.
-    pub(super) fn memory(&self, plan: &Plan, aovs: &BTreeSet<Aov>) -> u64 {
+    pub(super) fn memory(&self, plan: &Plan, aovs: &BTreeSet<Aov>) -> Needs {
         let render = self;
         let dimension = plan[render.scene].dimension;
         let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
@@ -372,6 +390,11 @@ impl RenderPlan {
             columns |= Columns::DIRECT;
         }
         let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
+        let (mut whole, mut holds) = (0, "one layer of its picture");
+        if render.screen_space.is_some() {
+            columns |= Columns::POSITION | Columns::NORMAL | Columns::OCCLUSION;
+            (whole, holds) = (size_of::<f32>() as u64, "one layer of its picture and the depth of all of it");
+        }
         if render.denoise {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
             columns |= Columns::FITTED | Columns::MISFIT | Columns::ERROR;
@@ -381,7 +404,8 @@ impl RenderPlan {
         // Filters keep the layers that they look at.
         let layers = if axes == 3 { (1 + halo).min(render.dimensions[2] as u64) } else { 1 };
         let voxel = samples + layers * columns.bytes::<4>() as u64 + arrays;
-        (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel)
+        let memory = (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel);
+        Needs { memory: memory.saturating_add(render.voxels().saturating_mul(whole)), disk: 0, holds }
     }
 
     /// Makes the picture, and the files that `open` opens for it; `name` is what it is called where progress is told.
@@ -400,14 +424,15 @@ impl RenderPlan {
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
         picture.filters = filters(plan, render, &picture);
-        picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
+        picture.audit = render.audit(plan);
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
         let mut files = open(&picture.grid, hash)?;
         let aovs = files.aovs().to_vec();
         let (mut seen, mut behind) = (0, 0);
-        // Two passes over the voxels: what is seen, and its shade.
-        let running = progress.stage(name, 2 * render.voxels());
+        // Two passes over the voxels: what is seen, and its shade; and, where that takes longest, another in the image.
+        let passes = 2 + u64::from(render.screen_space.is_some());
+        let running = progress.stage(name, passes * render.voxels());
         let accuracy = picture.render(&aovs, None, progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;
             behind += slab.behind;
@@ -503,6 +528,9 @@ pub(super) fn mark_seen<const D: usize>(
 }
 
 fn shading<const D: usize>(plan: &Plan, render: &RenderPlan, scene: &SceneRun<D>) -> render::Shading {
+    if let Some(screen_space) = &render.screen_space {
+        return render::Shading::ScreenSpace(screen_space.settings());
+    }
     let Some(occlusion) = render.occlusion else { return render::Shading::None };
     match (render.shading, &plan[occlusion].source) {
         (Shading::Voxel, OcclusionSource::Compute(computation)) => render::Shading::Voxel(computation.estimator()),
@@ -531,6 +559,21 @@ fn rays(occlusion: &OcclusionPlan, shading: Shading, dimension: Dimension, toler
 fn rays_of(plan: &Plan, render: &RenderPlan) -> Option<Sampling> {
     let tolerance = render.tolerance.unwrap_or(TOLERANCE);
     rays(&plan[render.occlusion?], render.shading, plan[render.scene].dimension, tolerance)
+}
+
+/// How occlusion is looked for in the image itself, if it is.
+fn screen_space(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Option<ScreenSpacePlan>, Invalid> {
+    let plan = screen_space::plan(spec.screen_space.as_ref(), &format!("{path}.{}", screen_space::WORD))?;
+    if spec.occlusion.as_deref() != Some(screen_space::WORD) {
+        if spec.screen_space.is_some() {
+            resolver.warn(format!("{path}.screen_space"), "has no effect without `occlusion: screen_space`");
+        }
+        return Ok(None);
+    }
+    if spec.shading.is_some() {
+        resolver.warn(format!("{path}.shading"), "has no effect with `occlusion: screen_space`");
+    }
+    Ok(Some(plan))
 }
 
 /// The standard error that a voxel may have.

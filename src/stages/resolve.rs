@@ -7,7 +7,7 @@ use super::names::{Outputs, unfit_name};
 use super::{Invalid, Plan, Planned, Ref, Stage, StagePlan, StageSpec, suggest};
 
 /// Words that stand for the pipeline's own keys where a stage is named, and for no occlusion.
-const RESERVED: [&str; 4] = ["name", "seed", "stages", "none"];
+const RESERVED: [&str; 5] = ["name", "seed", "stages", "none", super::screen_space::WORD];
 
 /// A plan that grows stage by stage, with what is needed to resolve the next one.
 pub struct Resolver {

@@ -9,6 +9,7 @@ mod limits;
 mod mesh;
 mod pictures;
 mod provenance;
+mod shade;
 mod twins;
 
 use std::collections::BTreeMap;

@@ -4,8 +4,8 @@
 //!
 //! - [`convergence`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A level is repeated with other
 //!   seeds until it has traced [`convergence::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
-//! - [`pictures`]: every way to shade an image, `flat`, `smooth`, `voxel`, `voxel` denoised, and `auto`, against the value of
-//!   each visible point itself;
+//! - [`pictures`]: every way to shade an image, `flat`, `smooth`, `voxel`, `voxel` denoised, `auto`, and
+//!   `screen_space`, against the value of each visible point itself;
 //! - [`precision`]: on how many rays plain Cramer's rule, in `f32` and in `f64`, says something else than exact signs; and
 //!   what each deviation of the published algorithm does to its values.
 //!

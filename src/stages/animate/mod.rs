@@ -282,7 +282,7 @@ impl Stage for AnimatePlan {
         }
         let aovs: BTreeSet<Aov> = animation.arrays.iter().copied().collect();
         let frame = render.voxels().saturating_mul(Format::Vti.disk_bytes(&write, plan[animation.scene].dimension));
-        Needs { memory: render.memory(plan, &aovs), disk: frame.saturating_mul(frames) }
+        Needs { disk: frame.saturating_mul(frames), ..render.memory(plan, &aovs) }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
@@ -425,7 +425,7 @@ fn move_objects<const D: usize>(
     let progress = run.progress;
     let stopped = |invalid: Invalid| match progress.cancelled() {
         true => StageError::Cancelled(Cancelled),
-        false => StageError::Moved(invalid),
+        false => StageError::Invalid(invalid),
     };
     let bodies = Bodies::<D>::build(plan, animation.scene, progress).map_err(stopped)?;
     for &i in stale {

@@ -7,7 +7,7 @@
 mod files;
 mod png;
 mod raw;
-mod vti;
+pub(super) mod vti;
 pub(super) mod vtu;
 
 use std::io::{BufReader, Write};
@@ -308,6 +308,7 @@ const MESH_LEFT_OUT: &[LeftOut] = &[
     LeftOut::new("/supersample", "a mesh has no voxels"),
     LeftOut::new("/dilate", "a mesh has no voxels"),
     LeftOut::new("/lighting", "a mesh is not lit"),
+    LeftOut::new("/screen_space", "a mesh is not looked at in an image"),
 ];
 
 impl Stage for WritePlan {
@@ -415,7 +416,7 @@ impl Stage for WritePlan {
         let write = &plan[me];
         let dimension = plan[plan[write.render].scene].dimension;
         let voxel = write.files.iter().filter(|file| stale(&file.path)).map(|f| f.format.disk_bytes(write, dimension));
-        Needs { memory: 0, disk: plan[write.render].voxels().saturating_mul(voxel.sum()) }
+        Needs { disk: plan[write.render].voxels().saturating_mul(voxel.sum()), ..Needs::default() }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String {

@@ -14,6 +14,7 @@ use crate::render::{Accuracy, Aov};
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
 use crate::stages::render::{RenderPlan, array_bytes};
+use crate::stages::screen_space::WORD;
 use crate::volume::Array;
 
 pub(super) struct Vti;
@@ -98,6 +99,11 @@ fn numbers(accuracy: &Accuracy) -> [(&'static str, f64); 3] {
     [("occlusion_rms_error", rms), ("occlusion_largest_error", largest), ("occlusion_voxels_checked", voxels as f64)]
 }
 
+/// Puts another text of the pipeline into a file whose arrays are appended.
+pub(in crate::stages) fn retell(path: &Path, text: &str) -> Result<u64, Error> {
+    copy_over(path, |source, out| vti::retell(source, out, vti::Encoding::Appended, (PIPELINE, text)))
+}
+
 fn encoding(write: &WritePlan) -> vti::Encoding {
     match write.encoding {
         Encoding::Appended => vti::Encoding::Appended,
@@ -119,13 +125,14 @@ fn settings(
         OcclusionSource::Compute(computation) => computation.told(),
         OcclusionSource::Load(_) => json!("loaded"),
     });
+    let occlusion = occlusion.or_else(|| render.screen_space.as_ref().map(|space| json!({ WORD: space.written() })));
     let settings = json!({
         "seed": plan.seed,
         "scene": { "dimension": scene.dimension, "mesh": mesh_hash },
         "occlusion": occlusion,
         "camera": render.camera,
         "dimensions": render.dimensions,
-        "shading": render.shading,
+        "shading": render.screen_space.is_none().then_some(render.shading),
         "denoise": render.denoise,
         "tolerance": render.tolerance,
         "supersample": render.supersample,
@@ -144,7 +151,7 @@ fn settings(
             ("settings".to_owned(), settings.to_string()),
         ],
         // Known when the picture is there; 0 of 0 voxels if it shows nothing.
-        numbers: match render.occlusion.and_then(|occlusion| plan[occlusion].audit()) {
+        numbers: match render.audit(plan) {
             Some(_) => numbers(&Accuracy::default()).map(|(name, number)| (name.to_owned(), number)).into(),
             None => Vec::new(),
         },
