@@ -25,7 +25,7 @@ use crate::occlusion::Estimator;
 use crate::render::filters::denoise::Refine;
 use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Accuracy, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
+use crate::render::{self, Accuracy, Aov, Columns, MOST_LAYERS, MOST_SAMPLES, NOTHING, Renderer};
 use crate::text::number;
 use crate::trace::Sampling;
 
@@ -66,6 +66,10 @@ pub struct RenderSpec {
     /// (default 1).
     #[schemars(range(min = 1, max = 8))]
     pub supersample: Option<u64>,
+    /// Of every voxel also the surfaces behind the first that the ray through its centre passes: so many layers, front to back, in
+    /// arrays whose names end in the layer's number (`layer_depth` and others of `write.arrays`).
+    #[schemars(range(min = 1, max = 1000))]
+    pub layers: Option<u64>,
     /// Layers of empty voxels around bodies that take over the bodies' colour and occlusion, so that contours and volume
     /// renderings mix in nothing else; opacity tells what is real (default 3 in 4D, 0 in 3D).
     #[schemars(range(min = 0, max = 16))]
@@ -124,6 +128,8 @@ pub struct RenderPlan {
     pub tolerance: Option<f64>,
     /// Samples of a voxel along each axis.
     pub supersample: usize,
+    /// Layers of surfaces that arrays are made of; 0 for none.
+    pub layers: usize,
     /// Layers of empty voxels that take over bodies' values.
     pub dilate: usize,
     /// How it is lit; none shows colour times occlusion.
@@ -224,8 +230,9 @@ impl Stage for RenderPlan {
                 format!("with {supersample} samples along each axis an image has at most {MAX_DIMENSION} of them");
             return Err(Invalid::new(format!("{path}.supersample"), message));
         }
-        let layers = if dimension == Dimension::Four { 3 } else { 0 };
-        let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
+        let layers = within("layers", spec.layers, 0, 1, MOST_LAYERS)?;
+        let halo = if dimension == Dimension::Four { 3 } else { 0 };
+        let dilate = within("dilate", spec.dilate, halo, 0, MAX_DILATION)?;
         let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
         let arrays = Vec::new();
         let tolerance = (shading == Shading::Auto && denoise).then_some(tolerance);
@@ -238,6 +245,7 @@ impl Stage for RenderPlan {
             denoise,
             tolerance,
             supersample,
+            layers,
             dilate,
             lighting,
             visibility,
@@ -247,7 +255,12 @@ impl Stage for RenderPlan {
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
         let written = plan.all::<WritePlan>().any(|(_, write)| write.render == me);
-        (!written).then_some("no `write` stage writes this image")
+        let layers = plan[me].layers == 0 || plan[me].arrays.iter().any(|aov| aov.needs_layers());
+        match (written, layers) {
+            (false, _) => Some("no `write` stage writes this image"),
+            (true, false) => Some("no `write` stage writes its `layers`; add `layer_depth` or others to its `arrays`"),
+            (true, true) => None,
+        }
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -269,6 +282,9 @@ impl Stage for RenderPlan {
         if let (Some(lighting), Some(written)) = (&render.lighting, written.as_object_mut()) {
             written.extend(lighting.written());
         }
+        if render.layers > 0 {
+            written["layers"] = render.layers.into();
+        }
         // Elsewhere it has no effect, and would be warned of.
         if rays_of(plan, render).is_some() {
             written["denoise"] = render.denoise.into();
@@ -288,10 +304,13 @@ impl Stage for RenderPlan {
             return Needs::default();
         }
         let dimension = plan[render.scene].dimension;
-        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
+        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension, render.layers)).sum();
         let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
         if render.lighting.is_some() {
             columns |= Columns::DIRECT;
+        }
+        if plan[render.scene].is_translucent() {
+            columns |= Columns::BEHIND | Columns::THROUGH;
         }
         let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
         if render.denoise {
@@ -342,6 +361,7 @@ impl Stage for RenderPlan {
         let shading = shading(plan, render, scene);
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
+        picture.layers = render.layers;
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
         picture.filters = filters(plan, render, &picture);
         picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
@@ -397,13 +417,13 @@ pub(super) fn is_stale(me: Ref<RenderPlan>, plan: &Plan, stale: &dyn Fn(&Path) -
     writes.any(|(_, write)| !write.stale(Content::Voxels, stale).is_empty())
 }
 
-/// Bytes that a voxel takes in this array.
-pub(super) fn array_bytes(aov: Aov, dimension: Dimension) -> u64 {
+/// Bytes that a voxel takes in this array, or in those of so many layers.
+pub(super) fn array_bytes(aov: Aov, dimension: Dimension, layers: usize) -> u64 {
     let bytes = match dimension {
         Dimension::Three => aov.bytes::<3>(),
         Dimension::Four => aov.bytes::<4>(),
     };
-    bytes as u64
+    (bytes * aov.count(layers)) as u64
 }
 
 /// Marks the vertices of the simplices that a render shows, unless that costs more than is `left` to spend on it.

@@ -47,6 +47,19 @@ pub struct ScenePlan {
     pub eye: Option<Vec<f64>>,
 }
 
+impl ScenePlan {
+    /// Whether light passes some object.
+    pub fn is_translucent(&self) -> bool {
+        self.translucent().is_some()
+    }
+
+    /// What the first object that light passes is called, if there is one.
+    pub(super) fn translucent(&self) -> Option<String> {
+        let at = self.objects.iter().position(|object| object.opacity.is_some_and(|opacity| opacity < 1.0))?;
+        Some(self.objects[at].name.clone().unwrap_or_else(|| format!("object {}", at + 1)))
+    }
+}
+
 impl Stage for ScenePlan {
     type Spec = SceneSpec;
     const KIND: &'static str = "scene";
@@ -199,7 +212,9 @@ pub fn build<const D: usize>(
         };
         let color = object.color.rgb().map_err(blame)?;
         let crease = object.crease().map_err(blame)?;
+        let opacity = object.surface_opacity().map_err(blame)?;
         builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
+        builder.set_opacity(opacity);
     }
     let mesh = builder.finish_watched(progress).ok_or_else(|| Invalid::new(path, "stopped"))?;
     notes.extend(worth_telling(&mesh).into_iter().map(|note| format!("scene {id}: {note}")));

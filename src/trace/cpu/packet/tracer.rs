@@ -85,7 +85,7 @@ impl<const D: usize> PacketTracer<D> {
         if normal.amax() == 0.0 {
             return Ok(Estimate::known(1.0));
         }
-        if !tracer.wide().serves(&position) {
+        if mesh.is_translucent() || !tracer.wide().serves(&position) {
             return estimate_at(tracer, point, sampling, progress);
         }
         let vertex = match *point {
