@@ -50,13 +50,7 @@ pub enum Wanted {
 impl<const D: usize> Tracer<D> {
     /// Gathers all simplices that the ray hits at a distance in `(0, limit]`, in no order; or returns true as soon as
     /// there is one that is wanted alone.
-    pub fn gather(
-        &self,
-        ray: &Ray<D>,
-        limit: f32,
-        wanted: impl Fn(u32) -> Wanted,
-        found: &mut Vec<Candidate>,
-    ) -> bool {
+    pub fn gather(&self, ray: &Ray<D>, limit: f32, wanted: impl Fn(u32) -> Wanted, found: &mut Vec<Candidate>) -> bool {
         found.clear();
         self.bvh().any(ray, limit, |simplex| {
             let wanted = wanted(simplex);

@@ -64,7 +64,18 @@ impl<const D: usize> Renderer<D> {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
         let filters = Vec::new();
-        Self { backend, camera, grid, shading, lighting: None, visibility, supersample: 1, layers: 0, filters, audit: None }
+        Self {
+            backend,
+            camera,
+            grid,
+            shading,
+            lighting: None,
+            visibility,
+            supersample: 1,
+            layers: 0,
+            filters,
+            audit: None,
+        }
     }
 
     /// The scene.

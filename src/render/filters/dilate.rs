@@ -82,7 +82,8 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         // spoils moves inwards by a layer a step, and so stays within the halo.
         let value = |i: usize| {
             let (weight, albedo, occlusion) = (input.opacity(i), input.albedo[i], input.occlusion[i]);
-            let [direct, behind] = [&input.direct, &input.behind].map(|column| column.get(i).copied().unwrap_or_default());
+            let [direct, behind] =
+                [&input.direct, &input.behind].map(|column| column.get(i).copied().unwrap_or_default());
             Value { weight, albedo, direct, behind, occlusion }
         };
         let mut values: Vec<Value> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();

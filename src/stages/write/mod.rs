@@ -381,7 +381,8 @@ impl Stage for WritePlan {
             }
             if array.is_layered() && layers == 0 {
                 let (id, name) = (resolver.plan.id(render), array.name());
-                let message = format!("render `{id}` has no layers for `{name}`; give it `layers`, as many as are wanted");
+                let message =
+                    format!("render `{id}` has no layers for `{name}`; give it `layers`, as many as are wanted");
                 return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
             }
             if *array == Aov::Light && resolver.plan[render].lighting.is_none() {

@@ -5,7 +5,8 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{
-    Compression, Content, Encoding, Image, LeftOut, Opening, OutputFormat, PROGRAM, Retell, VoxelFile, WritePlan, copy_over,
+    Compression, Content, Encoding, Image, LeftOut, Opening, OutputFormat, PROGRAM, Retell, VoxelFile, WritePlan,
+    copy_over,
 };
 use crate::geometry::Dimension;
 use crate::io::vti::{self, ArraySpec, VtiWriter};
