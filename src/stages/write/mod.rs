@@ -146,8 +146,8 @@ macro_rules! formats {
             /// The render, by its id.
             pub input: Option<String>,
             $($(#[$doc])+ pub $key: Option<String>,)+
-            /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`, and of a render with `layers` all arrays
-            /// of layers).
+            /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`; also `coverage` where light passes objects,
+            /// and of a render with `layers` all arrays of layers).
             pub arrays: Option<Vec<Aov>>,
             /// How the `.vti` stores numbers (default `appended`).
             pub encoding: Option<Encoding>,
@@ -367,8 +367,12 @@ impl Stage for WritePlan {
         let layers = resolver.plan[render].layers;
         let arrays = match &spec.arrays {
             None => {
+                // Of what light passes, figures show where something is.
+                let plan = &resolver.plan;
+                let coverage = plan[plan[render].scene].is_translucent().then_some(&Aov::Coverage);
                 let of_layers = Aov::ALL.iter().filter(|aov| layers > 0 && aov.needs_layers());
-                [Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity].iter().chain(of_layers).copied().collect()
+                let usual = [Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity];
+                usual.iter().chain(coverage).chain(of_layers).copied().collect()
             }
             Some(arrays) => arrays.clone(),
         };
