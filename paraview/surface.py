@@ -6,8 +6,9 @@
 
 # The width of the kernel that smooths skin and colours, in voxels. Empty voxels have no part in colours.
 SMOOTH = 0.7
-# What the kernel leaves of a rod one voxel thick is 0.325: so many times that is above one half.
-BOLDER = 1.7
+# What the kernel leaves of a rod one voxel thick is 0.325 at its middle: with so many times that its skin has the same
+# cross-section.
+BOLDER = 2.1
 # Faces that meet at a larger angle, in degrees, meet at a sharp edge.
 EDGE_ANGLE = 40.0
 # How often normals are averaged.
@@ -138,7 +139,8 @@ if together.GetNumberOfInputConnections(0) > 0:
 '''
 
 # Normals of the skin, split at sharp edges. Coverage comes in steps, so a flat face that is almost along the voxels has
-# ripples of a few hundredths of a voxel, which light would show: normals are averaged over neighbours, not across edges.
+# ripples of a few hundredths of a voxel, which light would show: normals are averaged over neighbours, but not across
+# edges.
 SMOOTH_NORMALS = '''
 import numpy
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
