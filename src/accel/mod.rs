@@ -1,6 +1,7 @@
 //! Bounding volume hierarchies over the simplices of a mesh, and the questions asked of them: which simplex does a ray hit
 //! first, does it hit any, and which surfaces does it pass on its way.
 
+mod apart;
 mod build;
 mod bvh;
 mod node;
