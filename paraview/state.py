@@ -162,8 +162,9 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 points, cells = self.GetInputDataObject(0, 0), self.GetOutputDataObject(0)
 extent, origin, spacing = list(points.GetExtent()), list(points.GetOrigin()), points.GetSpacing()
 arrays = points.GetPointData()
-if arrays.HasArray('opacity'):
-    shown = vtk_to_numpy(arrays.GetArray('opacity')) >= 0.5
+seen = [name for name in ('coverage', 'opacity') if arrays.HasArray(name)]
+if seen:
+    shown = vtk_to_numpy(arrays.GetArray(seen[0])) >= 0.5
 elif arrays.HasArray('rgba'):
     shown = vtk_to_numpy(arrays.GetArray('rgba'))[:, 3] >= 128
 else:  # the background alone is pure white

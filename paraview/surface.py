@@ -33,7 +33,10 @@ def array_of(name, *components):
     return None if found is None else vtk_to_numpy(found).reshape(shape + components)
 
 # What is covered, in what colour, by which object.
-rgba, colours, opacity = array_of('rgba', 4), array_of('rgb', 3), array_of('opacity')
+# Where light passes objects, the file tells what is covered apart from what is opaque.
+rgba, colours, opacity = array_of('rgba', 4), array_of('rgb', 3), array_of('coverage')
+if opacity is None:
+    opacity = array_of('opacity')
 occlusion, number = array_of('ambient_occlusion'), array_of('object')
 if opacity is None:  # of a .raw file the background alone is pure white
     opacity = rgba[..., 3] / numpy.float32(255) if rgba is not None else (colours < 1).any(axis=3)

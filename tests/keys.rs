@@ -23,7 +23,7 @@ stages:
   - occlusion: {id: loaded, input: s, load: v.f32}
   - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
   - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
-  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
+  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, layers: 2, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
   - render: {id: mended, occlusion: o2, dimensions: [3, 4, 5], shading: auto}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
@@ -77,6 +77,7 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("RenderSpec.denoise", Ok("parallel.denoise=false")),
     ("RenderSpec.tolerance", Ok("mended.tolerance=0.03")),
     ("RenderSpec.supersample", Ok("parallel.supersample=2")),
+    ("RenderSpec.layers", Ok("parallel.layers=3")),
     ("RenderSpec.dilate", Ok("parallel.dilate=2")),
     ("RenderSpec.lights", Err("its keys follow")),
     ("LightSpec.direction", Ok("parallel.lights[0].direction=[0, -1, 0, 1]")),
@@ -253,6 +254,10 @@ fn every_object_s_field_counts() {
     ] {
         assert_eq!(differing(&before, &keys(folder.path(), PIPELINE, &[set])), all, "{set}");
     }
+    // The closed form knows opaque objects only.
+    let opaque = keys(folder.path(), PIPELINE, &["exact.method=sobol"]);
+    let open = keys(folder.path(), PIPELINE, &["exact.method=sobol", "s.objects[0].opacity=0.5"]);
+    assert_eq!(differing(&opaque, &open), all);
     // What faces the eye depends on where the first camera is.
     let moved = differing(&before, &keys(folder.path(), PIPELINE, &["r.camera.eye=[0, 0, 0, 3]"]));
     assert_eq!(moved, all);

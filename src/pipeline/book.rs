@@ -81,7 +81,8 @@ impl Book {
         self.scene_notes = notes;
     }
 
-    fn tell(&mut self, notes: &[String]) {
+    /// Tells this of the run, unless it was told before.
+    pub fn tell(&mut self, notes: &[String]) {
         for note in notes {
             if !self.report.notes.contains(note) {
                 self.report.notes.push(note.clone());

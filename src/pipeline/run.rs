@@ -43,7 +43,7 @@ pub enum RunError {
     Stage(StageError),
     /// A picture doesn't fit in memory.
     #[error(
-        "{stage}: {holds} takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays"
+        "{stage}: {holds} takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays or layers"
     )]
     Memory {
         /// The stage, by its kind and id.
@@ -189,6 +189,13 @@ impl Schedule<'_> {
         let detail = format!("{} vertices, {} simplices", grouped(vertices), grouped(simplices));
         self.times.insert(scene.index(), (building, detail));
         self.book.begin_scene(notes);
+        let is_shaded = plan.all::<OcclusionPlan>().any(|(_, occlusion)| occlusion.scene == scene);
+        if self.opencl.is_some() && mesh.is_translucent() && is_shaded {
+            let id = plan.id(scene);
+            self.book.tell(&[format!(
+                "scene {id}: light passes some objects, so its ambient occlusion is computed by the processor, not by OpenCL"
+            )]);
+        }
         let session = match &self.opencl {
             Some(opencl) => Session::on(mesh, Arc::clone(opencl)),
             None => Session::new(mesh),

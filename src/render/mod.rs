@@ -10,12 +10,16 @@
 //!    looks for it in the image alone;
 //! 4. [`filters`]: what looks at neighbouring voxels;
 //! 5. [`Aov`]: the columns as the numbers of an array, for each array that somebody asked for.
+//!
+//! Where light passes objects, `behind` adds what is seen through them. Beside all this stand [`Layers`]: all surfaces that a voxel's ray passes, as arrays of their own.
 
 pub mod aov;
 mod audit;
+mod behind;
 mod camera;
 pub mod filters;
 pub mod gbuffer;
+mod layers;
 mod light;
 mod occlude;
 mod renderer;
@@ -30,9 +34,10 @@ pub use aov::Aov;
 pub use audit::Accuracy;
 pub use camera::{Camera, CameraError, Projection, View};
 pub use gbuffer::{Columns, GBuffer};
+pub use layers::{LayerPoint, Layers, MOST as MOST_LAYERS};
 pub use light::{DepthCue, Light, Lighting, Source};
 pub use renderer::{Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
 pub use screen_space::{DepthImage, ScreenSpace, Thickness};
 pub use shading::Shading;
-pub use visibility::{NOTHING, Visibility};
+pub use visibility::{NOTHING, Passages, Visibility};

@@ -6,15 +6,17 @@ use std::sync::Arc;
 use super::audit::Audit;
 use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
+use super::layers::LayerPass;
 use super::samples::Sampling;
 use super::surface::SurfacePass;
 use super::{
-    Accuracy, Aov, Camera, DepthImage, Lighting, NOTHING, ScreenSpace, Shading, Visibility, occlude, screen_space,
-    visibility,
+    Accuracy, Aov, Camera, DepthImage, Lighting, NOTHING, ScreenSpace, Shading, Visibility, behind, occlude,
+    screen_space, visibility,
 };
 use crate::accel::Tracer;
 use crate::occlusion::Error;
 use crate::progress::{Progress, Uncounted};
+use crate::trace::cpu::CpuBackend;
 use crate::trace::{self, RayBackend};
 use crate::volume::{Array, Grid, Volume};
 
@@ -38,6 +40,8 @@ pub struct Renderer<const D: usize> {
     pub visibility: visibility::Method,
     /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
     pub supersample: usize,
+    /// How many layers arrays are made of, at most [`super::MOST_LAYERS`].
+    pub layers: usize,
     /// What looks at neighbouring voxels, in this order.
     pub filters: Vec<Box<dyn ImageFilter<D>>>,
     /// The rays that some voxels are looked at again with, to measure how far off the picture is; others than its own.
@@ -49,7 +53,7 @@ pub struct Renderer<const D: usize> {
 pub struct Slab {
     /// Which layers.
     pub layers: Range<usize>,
-    /// The arrays that were asked for, in that order.
+    /// The arrays that were asked for, in that order; those of layers one after the other.
     pub arrays: Vec<Array>,
     /// How many of their voxels see something.
     pub seen: u64,
@@ -63,11 +67,22 @@ impl<const D: usize> Renderer<D> {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
         let filters = Vec::new();
-        Self { backend, camera, grid, shading, lighting: None, visibility, supersample: 1, filters, audit: None }
+        Self {
+            backend,
+            camera,
+            grid,
+            shading,
+            lighting: None,
+            visibility,
+            supersample: 1,
+            layers: 0,
+            filters,
+            audit: None,
+        }
     }
 
     /// The scene.
-    pub fn tracer(&self) -> &Tracer<D> {
+    pub fn tracer(&self) -> &Arc<Tracer<D>> {
         self.backend.tracer()
     }
 
@@ -105,8 +120,25 @@ impl<const D: usize> Renderer<D> {
         if columns.contains(Columns::DIRECT) {
             self.tracer().prepare();
         }
+        // Of the voxels' centres, and by the processor.
+        let layered = aovs.iter().any(|aov| aov.needs_layers()).then(|| {
+            let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Arc::clone(self.tracer())));
+            Visibility::new(backend, &self.camera, &self.grid, self.visibility)
+        });
+        let layered = layered.as_ref().map(|visibility| LayerPass {
+            backend: &*self.backend,
+            camera: &self.camera,
+            grid: &self.grid,
+            visibility,
+            shading: &self.shading,
+            most: self.layers,
+            occluded: aovs.contains(&Aov::LayerAmbientOcclusion),
+        });
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
             let mut buffer = pass.layers(layers, columns, progress)?;
+            if columns.intersects(behind::COLUMNS) {
+                behind::add(&pass, &*self.backend, &mut buffer, progress)?;
+            }
             match self.shading {
                 Shading::Voxel(estimator) => occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?,
                 Shading::Auto(_, estimator) => {
@@ -123,12 +155,15 @@ impl<const D: usize> Renderer<D> {
         let mut audit = self.audit.map(Audit::new);
         let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
         for first in (0..depth).step_by(thickness) {
-            let buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+            let mut buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+            let layers = layered.as_ref().map(|pass| pass.layers(buffer.layers(), progress)).transpose()?;
+            let layers = layers.unwrap_or_default();
+            buffer.passages.iter_mut().enumerate().for_each(|(i, count)| *count = layers.count(i));
             let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
             if let Some(audit) = &mut audit {
                 audit.add(&buffer);
             }
-            let arrays = aovs.iter().map(|aov| aov.array(&buffer)).collect();
+            let arrays = aovs.iter().flat_map(|aov| aov.arrays(&buffer, &layers)).collect();
             let is_behind = |simplex: u32| simplex != NOTHING && visibility.is_away(simplex);
             let behind = buffer.simplex.iter().filter(|&&simplex| is_behind(simplex)).count() as u64;
             sink(Slab { layers: buffer.layers(), arrays, seen, behind })?;
@@ -180,7 +215,9 @@ impl<const D: usize> Renderer<D> {
             | audited
             | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns());
         let is_lit = self.lighting.is_some() && columns.contains(Columns::ALBEDO);
-        if is_lit { columns | Columns::DIRECT } else { columns }
+        let passes = self.tracer().mesh().is_translucent() && columns.intersects(Columns::ALBEDO | Columns::COVERAGE);
+        let or_none = |wanted: bool, more: Columns| if wanted { more } else { Columns::empty() };
+        columns | or_none(is_lit, Columns::DIRECT) | or_none(passes, behind::COLUMNS)
     }
 
     /// Layers of a slab whose working set stays below `bytes`; at least one.
@@ -192,7 +229,7 @@ impl<const D: usize> Renderer<D> {
 
     /// Bytes that a voxel takes while its slab is made.
     fn bytes_per_voxel(&self, aovs: &[Aov]) -> usize {
-        bytes_per_voxel::<D>(self.columns(aovs), self.supersample, aovs)
+        bytes_per_voxel::<D>(self.columns(aovs), self.supersample, self.layers, aovs)
     }
 }
 
@@ -208,7 +245,7 @@ fn columns(shading: &Shading, aovs: &[Aov]) -> Columns {
 }
 
 /// Bytes that a voxel takes in the G-buffer, in arrays, and while its samples are looked at.
-fn bytes_per_voxel<const D: usize>(columns: Columns, supersample: usize, aovs: &[Aov]) -> usize {
+fn bytes_per_voxel<const D: usize>(columns: Columns, supersample: usize, layers: usize, aovs: &[Aov]) -> usize {
     let samples = supersample.pow(D as u32 - 1) * size_of::<u32>();
-    samples + columns.bytes::<D>() + aovs.iter().map(|aov| aov.bytes::<D>()).sum::<usize>()
+    samples + columns.bytes::<D>() + aovs.iter().map(|aov| aov.bytes::<D>() * aov.count(layers)).sum::<usize>()
 }

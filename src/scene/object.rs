@@ -83,6 +83,11 @@ pub struct ObjectSpec {
     /// The colour; a light grey of 0.8 if left out.
     #[serde(default)]
     pub color: Color,
+    /// The share of light that each of the object's surfaces keeps from passing, 0 to 1 (default 1, opaque). A ray through a
+    /// body passes two surfaces, or more, so of a body of 0.3 about half is seen through.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1))]
+    pub opacity: Option<f64>,
     /// Which way the surface faces: `input` (default), open surfaces by the order of their vertices, closed ones outwards; or
     /// `eye`, where it is seen from by the first render of the scene, so that a closed surface around the eye is a room.
     #[serde(default)]
@@ -269,6 +274,15 @@ impl ObjectSpec {
 }
 
 impl ObjectSpec {
+    /// How much light each of its surfaces keeps from passing.
+    pub fn surface_opacity(&self) -> Result<f32, Error> {
+        match self.opacity {
+            None => Ok(1.0),
+            Some(opacity) if (0.0..=1.0).contains(&opacity) => Ok(opacity as f32),
+            Some(opacity) => Err(Error::invalid("opacity", format!("expected a number from 0 to 1, found {opacity}"))),
+        }
+    }
+
     /// Where the object's vertices are split.
     pub fn crease(&self) -> Result<Crease, Error> {
         Ok(match (self.crease_angle, self.shape()?) {
@@ -308,6 +322,7 @@ pub fn build_object_watched<const D: usize>(
 ) -> Result<Surface<D>, Error> {
     let shape = spec.shape()?;
     spec.color.rgb()?;
+    spec.surface_opacity()?;
     let mut surface = shape.build::<D>(folder, notes, progress)?;
     let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;

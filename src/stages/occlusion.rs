@@ -150,9 +150,17 @@ impl Stage for OcclusionPlan {
     }
 
     fn resolve(spec: &OcclusionSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let scene = resolver.input(path, spec.input.as_deref(), MISSING)?;
+        let scene: Ref<ScenePlan> = resolver.input(path, spec.input.as_deref(), MISSING)?;
         // Checked also beside `load`, so that taking `load` out reveals no new mistakes.
         let computation = computation(path, spec, resolver)?;
+        let method = computation.method;
+        if let Some(object) = resolver.plan[scene].translucent().filter(|_| !method.knows_opacity()) {
+            let message = format!(
+                "`{}` knows opaque objects only, and light passes {object}; use `method: sobol`, or leave out its `opacity`",
+                method.as_str()
+            );
+            return Err(Invalid::new(format!("{path}.method"), message));
+        }
         let source = match &spec.load {
             None => OcclusionSource::Compute(computation),
             Some(name) => {
@@ -542,6 +550,11 @@ impl Method {
 
     /// Whether its values are those of rays, and nothing else.
     pub fn is_by_rays(self) -> bool {
+        matches!(self, Method::Sobol | Method::Random | Method::Adaptive)
+    }
+
+    /// Whether it knows that light passes some objects.
+    fn knows_opacity(self) -> bool {
         matches!(self, Method::Sobol | Method::Random | Method::Adaptive)
     }
 

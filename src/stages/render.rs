@@ -28,7 +28,7 @@ use crate::progress::Progress;
 use crate::render::filters::denoise::Refine;
 use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Accuracy, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
+use crate::render::{self, Accuracy, Aov, Columns, MOST_LAYERS, MOST_SAMPLES, NOTHING, Renderer};
 use crate::text::number;
 use crate::trace::Sampling;
 use crate::volume::Grid;
@@ -75,6 +75,10 @@ pub struct RenderSpec {
     /// (default 3; 1 with `lights`, where each sample looks for shadows of its own, and from 270^3 voxels on).
     #[schemars(range(min = 1, max = 8))]
     pub supersample: Option<u64>,
+    /// Of every voxel also the surfaces behind the first that the ray through its centre passes: so many layers, front to back, in
+    /// arrays whose names end in the layer's number (`layer_depth` and others of `write.arrays`).
+    #[schemars(range(min = 1, max = 1000))]
+    pub layers: Option<u64>,
     /// Layers of empty voxels around bodies that take over the bodies' colour and occlusion, so that contours and volume
     /// renderings mix in nothing else; opacity tells what is real (default 3 in 4D, 0 in 3D).
     #[schemars(range(min = 0, max = 16))]
@@ -135,6 +139,8 @@ pub struct RenderPlan {
     pub tolerance: Option<f64>,
     /// Samples of a voxel along each axis.
     pub supersample: usize,
+    /// Layers of surfaces that arrays are made of; 0 for none.
+    pub layers: usize,
     /// Layers of empty voxels that take over bodies' values.
     pub dilate: usize,
     /// How it is lit; none shows colour times occlusion.
@@ -246,8 +252,9 @@ impl Stage for RenderPlan {
                 format!("with {supersample} samples along each axis an image has at most {MAX_DIMENSION} of them");
             return Err(Invalid::new(format!("{path}.supersample"), message));
         }
-        let layers = if dimension == Dimension::Four { 3 } else { 0 };
-        let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
+        let layers = within("layers", spec.layers, 0, 1, MOST_LAYERS)?;
+        let halo = if dimension == Dimension::Four { 3 } else { 0 };
+        let dilate = within("dilate", spec.dilate, halo, 0, MAX_DILATION)?;
         let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
         let arrays = Vec::new();
         let tolerance = (shading == Shading::Auto && denoise).then_some(tolerance);
@@ -261,6 +268,7 @@ impl Stage for RenderPlan {
             denoise,
             tolerance,
             supersample,
+            layers,
             dilate,
             lighting,
             visibility,
@@ -269,8 +277,13 @@ impl Stage for RenderPlan {
     }
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
-        let used = (0..plan.stages.len()).any(|stage| plan.works_on(stage).contains(&me.index()));
-        (!used).then_some("no `write` stage writes this image")
+        let written = (0..plan.stages.len()).any(|stage| plan.works_on(stage).contains(&me.index()));
+        let layers = plan[me].layers == 0 || plan[me].arrays.iter().any(|aov| aov.needs_layers());
+        match (written, layers) {
+            (false, _) => Some("no `write` stage writes this image"),
+            (true, false) => Some("no `write` stage writes its `layers`; add `layer_depth` or others to its `arrays`"),
+            (true, true) => None,
+        }
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -294,6 +307,9 @@ impl Stage for RenderPlan {
         }
         if let (Some(lighting), Some(written)) = (&render.lighting, written.as_object_mut()) {
             written.extend(lighting.written());
+        }
+        if render.layers > 0 {
+            written["layers"] = render.layers.into();
         }
         // Elsewhere it has no effect, and would be warned of.
         if rays_of(plan, render).is_some() {
@@ -384,10 +400,13 @@ impl RenderPlan {
     pub(super) fn memory(&self, plan: &Plan, aovs: &BTreeSet<Aov>) -> Needs {
         let render = self;
         let dimension = plan[render.scene].dimension;
-        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
+        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension, render.layers)).sum();
         let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
         if render.lighting.is_some() {
             columns |= Columns::DIRECT;
+        }
+        if plan[render.scene].is_translucent() {
+            columns |= Columns::BEHIND | Columns::THROUGH;
         }
         let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
         let (mut whole, mut holds) = (0, "one layer of its picture");
@@ -422,6 +441,7 @@ impl RenderPlan {
         let shading = shading(plan, render, scene);
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
+        picture.layers = render.layers;
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
         picture.filters = filters(plan, render, &picture);
         picture.audit = render.audit(plan);
@@ -484,13 +504,13 @@ pub(super) fn is_stale(me: Ref<RenderPlan>, plan: &Plan, stale: &dyn Fn(&Path) -
     writes.any(|(_, write)| !write.stale(Content::Voxels, stale).is_empty())
 }
 
-/// Bytes that a voxel takes in this array.
-pub(super) fn array_bytes(aov: Aov, dimension: Dimension) -> u64 {
+/// Bytes that a voxel takes in this array, or in those of so many layers.
+pub(super) fn array_bytes(aov: Aov, dimension: Dimension, layers: usize) -> u64 {
     let bytes = match dimension {
         Dimension::Three => aov.bytes::<3>(),
         Dimension::Four => aov.bytes::<4>(),
     };
-    bytes as u64
+    (bytes * aov.count(layers)) as u64
 }
 
 /// Marks the vertices of the simplices that a render shows, unless that costs more than is `left` to spend on it.
@@ -502,6 +522,10 @@ pub(super) fn mark_seen<const D: usize>(
     left: &mut u64,
     mask: &mut [bool],
 ) -> Result<bool, StageError> {
+    // What is behind the first surfaces needs values too.
+    if run.plan[render.scene].is_translucent() || render.arrays.contains(&Aov::LayerAmbientOcclusion) {
+        return Ok(false);
+    }
     let camera = camera::camera(&render.camera)?;
     // All samples, not the voxels' centres alone.
     let samples = |a: usize| if a < D - 1 { render.dimensions[a] * render.supersample } else { 1 };

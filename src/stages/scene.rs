@@ -49,6 +49,19 @@ pub struct ScenePlan {
     pub eye: Option<Vec<f64>>,
 }
 
+impl ScenePlan {
+    /// Whether light passes some object.
+    pub fn is_translucent(&self) -> bool {
+        self.translucent().is_some()
+    }
+
+    /// What the first object that light passes is called, if there is one.
+    pub(super) fn translucent(&self) -> Option<String> {
+        let at = self.objects.iter().position(|object| object.opacity.is_some_and(|opacity| opacity < 1.0))?;
+        Some(self.objects[at].name.clone().unwrap_or_else(|| format!("object {}", at + 1)))
+    }
+}
+
 impl Stage for ScenePlan {
     type Spec = SceneSpec;
     const KIND: &'static str = "scene";
@@ -238,7 +251,10 @@ fn add<const D: usize>(
     let color = object.color.rgb().map_err(|e| blame(plan, scene, i, &e))?;
     let crease = object.crease().map_err(|e| blame(plan, scene, i, &e))?;
     let name = name_of(object, i);
-    builder.add_creased(&name, color, surface, open, crease).map_err(|e| Invalid::new(here.clone(), e.to_string()))
+    let opacity = object.surface_opacity().map_err(|e| blame(plan, scene, i, &e))?;
+    builder.add_creased(&name, color, surface, open, crease).map_err(|e| Invalid::new(here.clone(), e.to_string()))?;
+    builder.set_opacity(opacity);
+    Ok(())
 }
 
 /// The surfaces of a scene's objects, kept so that some of them can be moved without building them again.

@@ -22,6 +22,10 @@ fn what_cannot_fit_is_told_before_anything_is_computed() {
     let bytes = 65_535u64 * 65_535 * (4 + (4 + 12 + 4 + 4) + (4 + 4 + 4 + 12));
     let told = format!("render image: one layer of its picture takes {bytes} bytes of memory, and ");
     folder.fails(&deep, 3, &[&told]);
+    // All layers that there may be, of which nobody can say before how many there are.
+    let layers = ["--set", "image.dimensions=[65535, 65535, 1]", "--set", "image.layers=1000"];
+    folder.fails(&layers, 3, &["render image: one layer of its picture takes ", "or layers"]);
+    folder.fails(&["--set", "image.layers=0"], 2, &["layers", "expected 1 to 1000, found 0"]);
     assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
 }
 

@@ -80,6 +80,11 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
     let Some((stage, occlusion)) = plan.all::<OcclusionPlan>().find(|(stage, _)| !plan.is_twin(stage.index())) else {
         return Err(refuse("stages", "there is no `occlusion` to study; add one after the scene"));
     };
+    if plan[occlusion.scene].is_translucent() {
+        let message = "light passes some of its objects, and the truth that methods are held against knows opaque ones only; \
+                       leave out their `opacity`";
+        return Err(refuse(plan.path(occlusion.scene), message));
+    }
     let _lock = Lock::take(&plan.out)?;
     let running = progress.stage("scene", 0);
     let prepared = pipeline.prepare(|stage| stage == occlusion.scene.index());

@@ -3,7 +3,7 @@
 //! A contour or a volume rendering interpolates between voxels. Where a body ends, it mixes the body's colour and
 //! occlusion with whatever stands in the empty voxel beside it, and white or "open" there would make rims that nothing in
 //! the scene has. So values bleed outwards, layer upon layer of voxels, by normalised convolution (Knutsson and Westin
-//! 1993): a voxel next to some that have values takes their mean, weighted by coverage and by 1 / distance^2. Opacity
+//! 1993): a voxel next to some that have values takes their mean, weighted by opacity and by 1 / distance^2. Opacity
 //! and coverage stay what they are, and tell what is real.
 
 use rayon::prelude::*;
@@ -23,11 +23,13 @@ pub struct Dilate {
 /// A voxel's values on their way outwards.
 #[derive(Clone, Copy, Debug, Default)]
 struct Value {
-    /// How much it counts: coverage, or 1 where it was filled; 0 where there is nothing yet.
+    /// How much it counts: opacity, or 1 where it was filled; 0 where there is nothing yet.
     weight: f32,
     albedo: [f32; 3],
     /// Black where the picture is not lit.
     direct: [f32; 3],
+    /// Black where all is opaque.
+    behind: [f32; 3],
     occlusion: f32,
 }
 
@@ -73,11 +75,12 @@ fn step(values: &mut [Value], filled: &mut [u8], dimensions: [usize; 3]) {
                 for c in 0..3 {
                     sum.albedo[c] += weight * value.albedo[c];
                     sum.direct[c] += weight * value.direct[c];
+                    sum.behind[c] += weight * value.behind[c];
                 }
             }
         }
-        let [albedo, direct] = [sum.albedo, sum.direct].map(|sum| sum.map(|c| c / total));
-        Value { weight: 1.0, albedo, direct, occlusion: sum.occlusion / total }
+        let [albedo, direct, behind] = [sum.albedo, sum.direct, sum.behind].map(|sum| sum.map(|c| c / total));
+        Value { weight: 1.0, albedo, direct, behind, occlusion: sum.occlusion / total }
     };
     let found: Vec<(usize, Value)> =
         rim(filled, dimensions).into_par_iter().with_min_len(256).map(|n| (n, mean(n))).collect();
@@ -99,9 +102,10 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         // Where the window ends and the image goes on, the outermost layer of each step misses neighbours; what that
         // spoils moves inwards by a layer a step, and so stays within the halo.
         let value = |i: usize| {
-            let (weight, albedo, occlusion) = (input.coverage[i], input.albedo[i], input.occlusion[i]);
-            let direct = input.direct.get(i).copied().unwrap_or_default();
-            Value { weight, albedo, direct, occlusion }
+            let (weight, albedo, occlusion) = (input.opacity(i), input.albedo[i], input.occlusion[i]);
+            let [direct, behind] =
+                [&input.direct, &input.behind].map(|column| column.get(i).copied().unwrap_or_default());
+            Value { weight, albedo, direct, behind, occlusion }
         };
         let mut values: Vec<Value> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
         let mut filled: Vec<u8> = values.iter().map(|value| u8::from(value.weight > 0.0)).collect();
@@ -117,6 +121,9 @@ impl<const D: usize> ImageFilter<D> for Dilate {
                 (out.albedo[i], out.occlusion[i]) = (value.albedo, value.occlusion);
                 if let Some(direct) = out.direct.get_mut(i) {
                     *direct = value.direct;
+                }
+                if let Some(behind) = out.behind.get_mut(i) {
+                    *behind = value.behind;
                 }
             }
         }

@@ -153,7 +153,7 @@ impl AnimatePlan {
 
     /// Bytes of all files' numbers before compression.
     fn bytes(&self, plan: &Plan) -> u64 {
-        let voxel = Format::Vti.voxel_bytes(&self.write(), plan[self.scene].dimension);
+        let voxel = Format::Vti.voxel_bytes(&self.write(), write::Image::of(plan, &plan[self.render]));
         plan[self.render].voxels().saturating_mul(voxel).saturating_mul(self.files.len() as u64)
     }
 }
@@ -281,7 +281,7 @@ impl Stage for AnimatePlan {
             return Needs::default();
         }
         let aovs: BTreeSet<Aov> = animation.arrays.iter().copied().collect();
-        let frame = render.voxels().saturating_mul(Format::Vti.disk_bytes(&write, plan[animation.scene].dimension));
+        let frame = render.voxels().saturating_mul(Format::Vti.disk_bytes(&write, write::Image::of(plan, render)));
         Needs { disk: frame.saturating_mul(frames), ..render.memory(plan, &aovs) }
     }
 

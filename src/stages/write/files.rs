@@ -18,7 +18,7 @@ pub(in crate::stages) struct PictureFiles {
 struct Open {
     path: PathBuf,
     file: Box<dyn VoxelFile>,
-    /// Where among the aovs its arrays are.
+    /// Where among a slab's arrays its own are.
     places: Vec<usize>,
 }
 
@@ -32,12 +32,16 @@ impl PictureFiles {
         grid: &Grid,
         mesh_hash: &str,
     ) -> Result<Self, Error> {
+        let layers = plan[render].layers;
         let mut aovs: Vec<Aov> = Vec::new();
+        // Each is one array, or one a layer.
         let mut place = |aov: Aov| {
-            aovs.iter().position(|&c| c == aov).unwrap_or_else(|| {
+            let nth = aovs.iter().position(|&c| c == aov).unwrap_or_else(|| {
                 aovs.push(aov);
                 aovs.len() - 1
-            })
+            });
+            let first: usize = aovs[..nth].iter().map(|aov| aov.count(layers)).sum();
+            first..first + aov.count(layers)
         };
         let mut files = Vec::new();
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == render) {
@@ -46,7 +50,7 @@ impl PictureFiles {
                 let seen = &plan[render];
                 let opened =
                     file.format.open(Opening { path: &path, plan, write, render: seen, grid, mesh_hash, told })?;
-                let places = file.format.arrays(write).into_iter().map(&mut place).collect();
+                let places = file.format.arrays(write).into_iter().flat_map(&mut place).collect();
                 files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
             }
         }
@@ -66,7 +70,7 @@ impl PictureFiles {
         let path = plan.out.join(file);
         let opened = Format::Vti.open(Opening { path: &path, plan, write, render, grid, mesh_hash, told })?;
         let aovs = Format::Vti.arrays(write);
-        let places: Vec<usize> = (0..aovs.len()).collect();
+        let places: Vec<usize> = (0..aovs.iter().map(|aov| aov.count(render.layers)).sum()).collect();
         let open = opened.map(|opened| Open { path: file.to_owned(), file: opened, places });
         Ok(Self { aovs, files: open.into_iter().collect() })
     }

@@ -89,7 +89,8 @@ impl<const D: usize> PacketTracer<D> {
             ShadingPoint::Vertex(vertex) => tracer.incidence().around(mesh.identity[vertex as usize]),
             ShadingPoint::Inside { .. } => &[],
         };
-        if !(tracer.wide().serves(&position) && tracer.wide().holds(around, mesh)) {
+        let is_served = !mesh.is_translucent() && tracer.wide().serves(&position) && tracer.wide().holds(around, mesh);
+        if !is_served {
             return estimate_at(tracer, point, sampling, progress);
         }
         let vertex = match *point {
