@@ -721,7 +721,11 @@ fn damaged_files_are_refused_by_name() {
     }
     refused("mesh.obj", b"v 0 0 0", "holds no triangle");
     refused("mesh.off", b"OFF", "unsupported: .off files; export .ply, .obj or .stl");
-    refused("mesh.mine", b"OFF", "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or");
+    refused(
+        "mesh.mine",
+        b"OFF",
+        "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or",
+    );
     refused(
         "no-name",
         b"v 0 0 0",
