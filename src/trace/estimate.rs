@@ -28,7 +28,7 @@ use super::sampling::{Sampler, Target};
 use crate::geometry::Dimension;
 
 /// How much more even several groups are together, as a share of the exponent that the rate of convergence gives.
-const GAIN: f64 = 0.6;
+pub(super) const GAIN: f64 = 0.6;
 
 /// Groups there are, once as many rays are known.
 const LEAST_GROUPS: usize = 8;
