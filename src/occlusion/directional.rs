@@ -101,13 +101,14 @@ impl Estimator {
                 found.vectors[i] = narrow(&gathered.vector);
             }
             if let Some(bounced) = &mut found.bounced {
-                bounced.set(i, gathered);
+                bounced.set(i, gathered, known[place].map(|(value, _)| value));
             }
         }
         Ok(found)
     }
 
-    /// The light of other surfaces alone, of which the vertices have this `radiosity`.
+    /// The light of other surfaces alone, of which the vertices have this `radiosity`, at points whose occlusion is known
+    /// already.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if `progress` says so.
@@ -118,6 +119,7 @@ impl Estimator {
         &self,
         tracer: &Tracer<D>,
         points: &[ShadingPoint<D>],
+        occlusion: &Estimates,
         radiosity: &[[f32; 3]],
         progress: &dyn Progress,
     ) -> Result<Bounced, Error> {
@@ -126,7 +128,10 @@ impl Estimator {
         let asked: Vec<ShadingPoint<D>> = order.iter().map(|&i| points[i]).collect();
         let gathered = gather(tracer, &asked, &self.rays(), Some(radiosity), progress)?;
         let mut found = Bounced::nothing(points.len());
-        order.iter().zip(&gathered).for_each(|(&i, gathered)| found.set(i, gathered));
+        for (&i, gathered) in order.iter().zip(&gathered) {
+            let is_exact = occlusion.errors.get(i) == Some(&0.0);
+            found.set(i, gathered, occlusion.values.get(i).filter(|_| is_exact).map(|&value| f64::from(value)));
+        }
         Ok(found)
     }
 
@@ -173,9 +178,12 @@ impl Bounced {
         Self { light: vec![[0.0; 3]; count], errors: vec![0.0; count], hits: 0, behind: 0 }
     }
 
-    fn set<const D: usize>(&mut self, i: usize, gathered: &Gathered<D>) {
-        self.light[i] = gathered.bounced.map(|c| c as f32);
-        self.errors[i] = gathered.bounced_error as f32;
+    /// Where occlusion is known exactly, the rays tell only how bright what they hit is, not how much of it there is.
+    fn set<const D: usize>(&mut self, i: usize, gathered: &Gathered<D>, occlusion: Option<f64>) {
+        let hidden = f64::from(gathered.hits) / f64::from(gathered.open.rays.max(1));
+        let share = occlusion.filter(|_| hidden > 0.0).map_or(1.0, |open| (1.0 - open) / hidden);
+        self.light[i] = gathered.bounced.map(|c| (c * share) as f32);
+        self.errors[i] = (gathered.bounced_error * share) as f32;
         self.hits += u64::from(gathered.hits);
         self.behind += u64::from(gathered.behind);
     }

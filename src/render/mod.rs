@@ -7,7 +7,7 @@
 //! 2. `surface`: the point that a voxel shows, and how [`Lighting`] lights it, into the columns of the [`GBuffer`] that
 //!    somebody asked for;
 //! 3. `occlude`: ambient occlusion at those points, where it does not come from the vertices;
-//! 4. [`filters`]: what looks at neighbouring voxels;
+//! 4. [`filters`]: what looks at neighbouring voxels; then the light of the sky and of other surfaces ([`Skylight`]);
 //! 5. [`Aov`]: the columns as the numbers of an array, for each array that somebody asked for.
 
 pub mod aov;
@@ -20,6 +20,7 @@ mod occlude;
 mod renderer;
 mod samples;
 mod shading;
+mod skylight;
 mod surface;
 pub mod tone;
 pub mod visibility;
@@ -32,4 +33,5 @@ pub use light::{DepthCue, Light, Lighting, Source};
 pub use renderer::{Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
 pub use shading::Shading;
+pub use skylight::{Skylight, radiosity, relight};
 pub use visibility::{NOTHING, Visibility};

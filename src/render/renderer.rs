@@ -7,8 +7,9 @@ use super::audit::Audit;
 use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
 use super::samples::Sampling;
+use super::skylight::shine;
 use super::surface::SurfacePass;
-use super::{Accuracy, Aov, Camera, Lighting, NOTHING, Shading, Visibility, occlude, visibility};
+use super::{Accuracy, Aov, Camera, Lighting, NOTHING, Shading, Skylight, Visibility, occlude, visibility};
 use crate::accel::Tracer;
 use crate::occlusion::Error;
 use crate::progress::Progress;
@@ -31,6 +32,9 @@ pub struct Renderer<const D: usize> {
     pub shading: Shading,
     /// How it is lit; none shows colour times ambient occlusion.
     pub lighting: Option<Lighting<D>>,
+    /// The sky, and the light of other surfaces; none is a sky that shines on all sides alike. Of a picture that is not lit
+    /// only the arrays show it.
+    pub skylight: Option<Skylight<D>>,
     /// How it is found out what voxels see; changes the time only.
     pub visibility: visibility::Method,
     /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
@@ -59,8 +63,8 @@ impl<const D: usize> Renderer<D> {
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
-        let filters = Vec::new();
-        Self { backend, camera, grid, shading, lighting: None, visibility, supersample: 1, filters, audit: None }
+        let (lighting, skylight, filters, audit) = (None, None, Vec::new(), None);
+        Self { backend, camera, grid, shading, lighting, skylight, visibility, supersample: 1, filters, audit }
     }
 
     /// The scene.
@@ -94,6 +98,7 @@ impl<const D: usize> Renderer<D> {
             visibility: &visibility,
             shading: &self.shading,
             lighting: self.lighting.as_ref(),
+            skylight: self.skylight.as_ref(),
         };
         if columns.contains(Columns::DIRECT) {
             self.tracer().prepare();
@@ -101,7 +106,10 @@ impl<const D: usize> Renderer<D> {
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
             let mut buffer = pass.layers(layers, columns, progress)?;
             match self.shading {
-                Shading::Voxel(estimator) => occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?,
+                Shading::Voxel(estimator) => {
+                    let skylight = self.skylight.as_ref();
+                    occlude::occlude_and_light(&*self.backend, estimator, &mut buffer, skylight, progress)?;
+                }
                 Shading::Auto(_, estimator) => {
                     buffer.interpolated.copy_from_slice(&buffer.occlusion);
                     occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?;
@@ -113,7 +121,8 @@ impl<const D: usize> Renderer<D> {
         let mut audit = self.audit.map(Audit::new);
         let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
         for first in (0..depth).step_by(thickness) {
-            let buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+            let mut buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+            shine(self.skylight.as_ref(), &mut buffer);
             let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
             if let Some(audit) = &mut audit {
                 audit.add(&buffer);
@@ -142,11 +151,19 @@ impl<const D: usize> Renderer<D> {
     /// The columns that arrays and filters need.
     fn columns(&self, aovs: &[Aov]) -> Columns {
         let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
-        let columns = columns(&self.shading, aovs)
+        let mut columns = columns(&self.shading, aovs)
             | audited
             | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns());
-        let is_lit = self.lighting.is_some() && columns.contains(Columns::ALBEDO);
-        if is_lit { columns | Columns::DIRECT } else { columns }
+        if self.lighting.is_some() && columns.contains(Columns::ALBEDO) {
+            columns |= Columns::DIRECT;
+            if self.skylight.is_some() {
+                columns |= Columns::IRRADIANCE;
+            }
+        }
+        if columns.contains(Columns::IRRADIANCE) {
+            columns |= Columns::OCCLUSION | self.skylight.as_ref().map_or(Columns::empty(), Skylight::columns);
+        }
+        columns
     }
 
     /// Layers of a slab whose working set stays below `bytes`; at least one.

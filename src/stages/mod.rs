@@ -38,6 +38,7 @@ pub mod render;
 mod resolve;
 mod run;
 pub mod scene;
+mod skylight;
 pub mod slice;
 mod subject;
 pub(crate) mod suggest;

@@ -14,9 +14,10 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
-use super::lighting::{self, DepthCueSpec, LightSpec, LightingKeys, LightingPlan};
+use super::lighting::{self, DepthCueSpec, LightSpec, LightingKeys, LightingPlan, SkySpec};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::scene::ScenePlan;
+use super::skylight::{self, LightAsked};
 use super::subject::scene_and_occlusion;
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
@@ -70,13 +71,19 @@ pub struct RenderSpec {
     /// renderings mix in nothing else; opacity tells what is real (default 3 in 4D, 0 in 3D).
     #[schemars(range(min = 0, max = 16))]
     pub dilate: Option<u64>,
-    /// Lights that throw shadows. With `lights`, `ambient` or `depth_cue` an image is lit: all light is added up in linear
+    /// Lights that throw shadows. With `lights`, `ambient`, `sky`, `bounce` or `depth_cue` an image is lit: all light is added up in linear
     /// numbers, `light` holds the sum, and the colours that are shown are what sRGB makes of it, white from 1 on. Without, it
     /// shows colour times occlusion.
     pub lights: Option<Vec<LightSpec>>,
     /// The light that comes from all sides, darkened by the occlusion (default 0.3 beside `lights`, 1 without).
     #[schemars(range(min = 0, max = 1_000_000))]
     pub ambient: Option<f64>,
+    /// A sky that is not equally bright on all sides; lights the picture exactly, by the open directions beside the
+    /// occlusion (default: equally bright).
+    pub sky: Option<SkySpec>,
+    /// With 1, surfaces are also lit by what other surfaces reflect of the sky, once (default 0); not of `lights`.
+    #[schemars(range(min = 0, max = 1))]
+    pub bounce: Option<u64>,
     /// The share of the lights that surfaces reflect in highlights (default 0).
     #[schemars(range(min = 0, max = 1))]
     pub specular: Option<f64>,
@@ -140,6 +147,8 @@ impl RenderSpec {
         LightingKeys {
             lights: self.lights.as_deref(),
             ambient: self.ambient,
+            sky: self.sky.as_ref(),
+            bounce: self.bounce,
             specular: self.specular,
             shininess: self.shininess,
             depth_cue: self.depth_cue.as_ref(),
@@ -148,6 +157,19 @@ impl RenderSpec {
 }
 
 impl RenderPlan {
+    /// What light from the sky and from other surfaces its files need.
+    fn light_asked(&self) -> LightAsked<'_> {
+        let lighting = self.lighting.as_ref();
+        let is_lit = self.arrays.iter().any(|aov| aov.is_lit() || *aov == Aov::Irradiance);
+        let is_bounce = |aov: &Aov| matches!(aov, Aov::Bounce | Aov::BounceError);
+        LightAsked {
+            lighting,
+            directions: self.arrays.contains(&Aov::BentNormal) || is_lit && lighting.is_some_and(|l| l.sky.is_some()),
+            bounce: lighting.is_some_and(|l| l.bounce) && (is_lit || self.arrays.iter().any(is_bounce)),
+            at_voxels: self.shading == Shading::Voxel,
+        }
+    }
+
     /// The number of voxels.
     pub fn voxels(&self) -> u64 {
         self.dimensions.iter().map(|&d| d as u64).product()
@@ -227,6 +249,18 @@ impl Stage for RenderPlan {
         let layers = if dimension == Dimension::Four { 3 } else { 0 };
         let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
         let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
+        for (key, given) in [("sky", spec.sky.is_some()), ("bounce", lighting.as_ref().is_some_and(|l| l.bounce))] {
+            let refusal = occlusion.map_or_else(
+                || {
+                    (key == "bounce")
+                        .then(|| "needs an occlusion, which tells how much light reaches a surface".to_owned())
+                },
+                |occlusion| resolver.plan[occlusion].no_directions(),
+            );
+            if let Some(message) = refusal.filter(|_| given) {
+                return Err(Invalid::new(format!("{path}.{key}"), message));
+            }
+        }
         let arrays = Vec::new();
         let tolerance = (shading == Shading::Auto && denoise).then_some(tolerance);
         Ok(Self {
@@ -290,8 +324,11 @@ impl Stage for RenderPlan {
         let dimension = plan[render.scene].dimension;
         let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
         let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
-        if render.lighting.is_some() {
+        if let Some(lighting) = &render.lighting {
             columns |= Columns::DIRECT;
+            if lighting.sky.is_some() || lighting.bounce {
+                columns |= Columns::IRRADIANCE | Columns::DIRECTION | Columns::HIDDEN;
+            }
         }
         let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
         if render.denoise {
@@ -339,10 +376,12 @@ impl Stage for RenderPlan {
         if let Some(occlusion) = render.occlusion.filter(|_| render.shading != Shading::Voxel) {
             occlusion::values(occlusion, run, scene)?;
         }
+        let skylight = scene.skylight(render.occlusion, render.light_asked(), run)?;
         let shading = shading(plan, render, scene);
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
+        picture.skylight = skylight;
         picture.filters = filters(plan, render, &picture);
         picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
         let start = Instant::now();
@@ -366,6 +405,9 @@ impl Stage for RenderPlan {
         let mut notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
         if let Some(lighting) = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit())) {
             notes.extend(lighting::in_vain(lighting, plan.id(me)));
+        }
+        if let Some(skylight) = &picture.skylight {
+            notes.extend(skylight::notes(skylight, &scene.session, plan.id(me)));
         }
         if behind > 0 && picture.shading.is_interpolated() {
             notes.push(format!(

@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::ImageFilter;
+use crate::geometry::Vector;
 use crate::occlusion::Error;
 use crate::progress::Progress;
 use crate::render::gbuffer::{Columns, GBuffer};
@@ -21,24 +22,38 @@ pub struct Dilate {
 }
 
 /// A voxel's values on their way outwards.
-#[derive(Clone, Copy, Debug, Default)]
-struct Value {
+#[derive(Clone, Copy, Debug)]
+struct Value<const D: usize> {
     /// How much it counts: coverage, or 1 where it was filled; 0 where there is nothing yet.
     weight: f32,
     albedo: [f32; 3],
     /// Black where the picture is not lit.
     direct: [f32; 3],
     occlusion: f32,
+    /// Zero where the picture has none of these.
+    direction: Vector<D>,
+    hidden: [f32; 3],
+}
+
+impl<const D: usize> Value<D> {
+    const NONE: Self = Self {
+        weight: 0.0,
+        albedo: [0.0; 3],
+        direct: [0.0; 3],
+        occlusion: 0.0,
+        direction: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])),
+        hidden: [0.0; 3],
+    };
 }
 
 /// Takes some layers one step further: every voxel without a value that has a neighbour with one.
-fn step(values: &[Value], dimensions: [usize; 3]) -> Vec<Value> {
+fn step<const D: usize>(values: &[Value<D>], dimensions: [usize; 3]) -> Vec<Value<D>> {
     let [width, height, _] = dimensions;
     let layers = values.len() / (width * height).max(1);
     let near = |i: usize, end: usize| i.saturating_sub(1)..=(i + 1).min(end - 1);
     let filled = |n: usize| {
         let (i, j, k) = (n % width, n / width % height, n / width / height);
-        let (mut sum, mut total) = (Value::default(), 0.0);
+        let (mut sum, mut total) = (Value::<D>::NONE, 0.0f32);
         for (z, y) in near(k, layers).flat_map(|z| near(j, height).map(move |y| (z, y))) {
             for x in near(i, width) {
                 let value = &values[x + width * (y + height * z)];
@@ -52,14 +67,17 @@ fn step(values: &[Value], dimensions: [usize; 3]) -> Vec<Value> {
                 for c in 0..3 {
                     sum.albedo[c] += weight * value.albedo[c];
                     sum.direct[c] += weight * value.direct[c];
+                    sum.hidden[c] += weight * value.hidden[c];
                 }
+                sum.direction += value.direction * weight;
             }
         }
         if total == 0.0 {
-            return Value::default();
+            return Value::NONE;
         }
-        let [albedo, direct] = [sum.albedo, sum.direct].map(|sum| sum.map(|c| c / total));
-        Value { weight: 1.0, albedo, direct, occlusion: sum.occlusion / total }
+        let [albedo, direct, hidden] = [sum.albedo, sum.direct, sum.hidden].map(|sum| sum.map(|c| c / total));
+        let (occlusion, direction) = (sum.occlusion / total, sum.direction / total);
+        Value { weight: 1.0, albedo, direct, occlusion, direction, hidden }
     };
     let next = values.par_iter().enumerate().with_min_len(1024);
     next.map(|(n, value)| if value.weight > 0.0 { *value } else { filled(n) }).collect()
@@ -80,9 +98,11 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         let value = |i: usize| {
             let (weight, albedo, occlusion) = (input.coverage[i], input.albedo[i], input.occlusion[i]);
             let direct = input.direct.get(i).copied().unwrap_or_default();
-            Value { weight, albedo, direct, occlusion }
+            let direction = input.direction.get(i).copied().unwrap_or(Value::NONE.direction);
+            let hidden = input.hidden.get(i).copied().unwrap_or_default();
+            Value { weight, albedo, direct, occlusion, direction, hidden }
         };
-        let mut values: Vec<Value> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
+        let mut values: Vec<Value<D>> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
         for _ in 0..self.layers {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
@@ -95,6 +115,12 @@ impl<const D: usize> ImageFilter<D> for Dilate {
                 (out.albedo[i], out.occlusion[i]) = (value.albedo, value.occlusion);
                 if let Some(direct) = out.direct.get_mut(i) {
                     *direct = value.direct;
+                }
+                if let Some(direction) = out.direction.get_mut(i) {
+                    *direction = value.direction;
+                }
+                if let Some(hidden) = out.hidden.get_mut(i) {
+                    *hidden = value.hidden;
                 }
             }
         }

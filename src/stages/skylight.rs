@@ -1,0 +1,106 @@
+//! The light of the sky and of other surfaces, for pictures and meshes: what is found at the vertices for it.
+//!
+//! Directions are found for all vertices, once a scene and occlusion, and serve every sky; light from surface to surface
+//! depends on the sky, so it is found for each picture.
+
+use std::sync::Arc;
+
+use super::describe::grouped;
+use super::lighting::LightingPlan;
+use super::occlusion::OcclusionPlan;
+use super::{Ref, Run, SceneRun, StageError};
+use crate::geometry::Vector64;
+use crate::occlusion::{Directional, Estimator};
+use crate::render::{Skylight, radiosity};
+use crate::session::Session;
+
+/// What light from the sky and from other surfaces a picture needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightAsked<'a> {
+    /// How it is lit, if it is.
+    pub lighting: Option<&'a LightingPlan>,
+    /// Whether it matters where the sky is open.
+    pub directions: bool,
+    /// Whether other surfaces send light.
+    pub bounce: bool,
+    /// Whether each voxel looks for itself.
+    pub at_voxels: bool,
+}
+
+impl<const D: usize> SceneRun<D> {
+    /// The occlusion of all vertices with directions.
+    ///
+    /// # Errors
+    /// If it can't be found, or Ctrl-C was pressed.
+    pub(super) fn directions(&mut self, of: Ref<OcclusionPlan>, run: &Run) -> Result<Arc<Directional<D>>, StageError> {
+        if let Some(found) = self.directions.get(&of) {
+            return Ok(Arc::clone(found));
+        }
+        let vertices = self.session.mesh().vertices.len() as u64;
+        let _running = run.progress.stage(&format!("directions of {}", run.plan.id(of)), vertices);
+        let found = Arc::new(self.session.directional(estimator(of, run), run.progress)?);
+        self.directions.insert(of, Arc::clone(&found));
+        Ok(found)
+    }
+
+    /// The light that a picture with this occlusion needs; none if that of an even sky will do.
+    ///
+    /// # Errors
+    /// As [`SceneRun::directions`].
+    pub(super) fn skylight(
+        &mut self,
+        occlusion: Option<Ref<OcclusionPlan>>,
+        asked: LightAsked,
+        run: &Run,
+    ) -> Result<Option<Skylight<D>>, StageError> {
+        if !asked.directions && !asked.bounce {
+            return Ok(None);
+        }
+        let gradient = asked.lighting.map_or_else(Vector64::zeros, LightingPlan::gradient);
+        let mut light = Skylight::new(gradient);
+        let Some(of) = occlusion else { return Ok(Some(light)) };
+        if asked.at_voxels && !asked.bounce {
+            return Ok(Some(light));
+        }
+        let found = self.directions(of, run)?;
+        if asked.bounce {
+            if asked.at_voxels {
+                light.radiosity = Some(Arc::new(radiosity(self.session.mesh(), &found, &gradient)));
+            } else {
+                let vertices = self.session.mesh().vertices.len() as u64;
+                let _running = run.progress.stage(&format!("bounce over {}", run.plan.id(of)), vertices);
+                let (sent, bounced) = self.session.bounced(estimator(of, run), &found, &gradient, run.progress)?;
+                (light.radiosity, light.bounced) = (Some(Arc::new(sent)), Some(Arc::new(bounced)));
+            }
+        }
+        light.directions = (!asked.at_voxels).then_some(found);
+        Ok(Some(light))
+    }
+}
+
+/// What finds directions.
+fn estimator(of: Ref<OcclusionPlan>, run: &Run) -> Estimator {
+    let max_distance = run.loaded.get(&of).map_or(f32::INFINITY, |loaded| loaded.sidecar.max_distance);
+    run.plan[of].directional(run.plan.seed, max_distance)
+}
+
+/// What to tell of the light of a picture that was made.
+pub(super) fn notes<const D: usize>(light: &Skylight<D>, session: &Session<D>, id: &str) -> Vec<String> {
+    let mut notes = Vec::new();
+    let (hits, behind) = light.seen();
+    if behind > 0 {
+        notes.push(format!(
+            "render {id}: {} of the {} rays that look for light of other surfaces see one from behind, and were told the light \
+             of its front; turn that object by `orientation`, or close it",
+            grouped(behind),
+            grouped(hits)
+        ));
+    }
+    if session.is_on_opencl() {
+        notes.push(format!(
+            "render {id}: open directions and the light of other surfaces were traced on the processor, as OpenCL devices tell \
+             whether rays hit something, not what"
+        ));
+    }
+    notes
+}
