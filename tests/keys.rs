@@ -23,7 +23,7 @@ stages:
   - occlusion: {id: loaded, input: s, load: v.f32}
   - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
   - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
-  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
+  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
   - render: {id: mended, occlusion: o2, dimensions: [3, 4, 5], shading: auto}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
@@ -74,6 +74,9 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("LightSpec.color", Ok("parallel.lights[1].color=[1, 1, 0]")),
     ("LightSpec.intensity", Ok("parallel.lights[1].intensity=3")),
     ("RenderSpec.ambient", Ok("parallel.ambient=0.1")),
+    ("RenderSpec.sky", Err("its keys follow")),
+    ("SkySpec.gradient", Ok("parallel.sky.gradient=[0, 0.4, 0, 0]")),
+    ("RenderSpec.bounce", Ok("parallel.bounce=0")),
     ("RenderSpec.specular", Ok("parallel.specular=0.2")),
     ("RenderSpec.shininess", Ok("parallel.shininess=11")),
     ("RenderSpec.depth_cue", Err("its keys follow")),

@@ -104,3 +104,59 @@ pub(super) fn notes<const D: usize>(light: &Skylight<D>, session: &Session<D>, i
     }
     notes
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::pipeline::{Document, Pipeline};
+
+    /// What is said of a pipeline with these stages behind a scene.
+    fn told(stages: &str) -> Result<(), String> {
+        let text = format!("name: p\nstages:\n  - scene: {{id: s, objects: []}}\n{stages}");
+        let document = Document::parse("p.yaml", &text).unwrap();
+        let told = Pipeline::from_document(document, &[], None).map(|_| ()).map_err(|e| e.to_string());
+        told.map_err(|message| message.split_once(": ").unwrap().1.to_owned())
+    }
+
+    #[test]
+    fn light_that_nobody_can_find_is_refused() {
+        let published = "  - occlusion: {method: as_published}\n";
+        let sobol = "  - occlusion: {}\n";
+        for (stages, expected) in [
+            (
+                "  - render: {dimensions: [1, 1, 1], bounce: 1}\n".to_owned(),
+                "stages[1].render.bounce: needs an occlusion, which tells how much light reaches a surface",
+            ),
+            (
+                format!("{published}  - render: {{dimensions: [1, 1, 1], sky: {{gradient: [0, 1, 0, 0]}}}}\n"),
+                "stages[2].render.sky: `as_published` tells how much of the sky is hidden, not where it is open; take `method: \
+                 sobol`",
+            ),
+            (
+                format!("{published}  - render: {{dimensions: [1, 1, 1], bounce: 1}}\n"),
+                "stages[2].render.bounce: `as_published` tells how much of the sky is hidden, not where it is open; take \
+                 `method: sobol`",
+            ),
+            (
+                format!(
+                    "{published}  - render: {{dimensions: [1, 1, 1]}}\n  - write: {{vti: a.vti, arrays: [bent_normal]}}\n"
+                ),
+                "stages[3].write.arrays[0]: `as_published` tells how much of the sky is hidden, not where it is open; take \
+                 `method: sobol`",
+            ),
+            (
+                format!(
+                    "{sobol}  - render: {{id: r, dimensions: [1, 1, 1]}}\n  - write: {{vti: a.vti, arrays: [rgba, bounce]}}\n"
+                ),
+                "stages[3].write.arrays[1]: render `r` follows no light from surface to surface; give it `bounce: 1`",
+            ),
+        ] {
+            assert_eq!(told(&stages).unwrap_err(), expected);
+        }
+        for stages in [
+            "  - render: {dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}}\n  - write: {vti: a.vti, arrays: [bent_normal, light]}\n",
+            "  - occlusion: {}\n  - render: {dimensions: [1, 1, 1], bounce: 0}\n  - write: {vti: a.vti, arrays: [irradiance]}\n",
+        ] {
+            assert_eq!(told(stages), Ok(()));
+        }
+    }
+}
