@@ -163,6 +163,15 @@ cells.SetOrigin(origin)
 cells.SetSpacing(spacing)
 for k in range(arrays.GetNumberOfArrays()):
     cells.GetCellData().AddArray(arrays.GetArray(k))
+if FLAT is not None and arrays.HasArray('rgba'):
+    # A pixel that is covered in part lets the white ground through: edges without stairs.
+    colours = vtk_to_numpy(arrays.GetArray('rgba')).astype(float)
+    share = colours[:, 3:] / 255
+    colours[:, :3] = colours[:, :3] * share + 255 * (1 - share)
+    colours[:, 3] = 255
+    blended = numpy_to_vtk((colours + 0.5).astype(numpy.uint8), deep=1)
+    blended.SetName('rgba')
+    cells.GetCellData().AddArray(blended)
 shown = numpy_to_vtk(shown, deep=1)
 shown.SetName('shown')
 cells.GetCellData().AddArray(shown)

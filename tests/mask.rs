@@ -77,7 +77,7 @@ stages:
         - hypersphere: {{radius: 0.5, subdivisions: 5}}
         - hypersphere: {{radius: 0.5, subdivisions: 5, center: [0.3, 0.1, 0, -1.1]}}
   - occlusion: {{id: ao, samples: 64{occlusion}}}
-  - render: {{id: a, camera: {{eye: [0, 0, 0, 2], field_of_view: 45}}, dimensions: [20, 22, 18]}}
+  - render: {{id: a, camera: {{eye: [0, 0, 0, 2], field_of_view: 45}}, dimensions: [20, 22, 18], supersample: 1}}
   - write: {{vti: a.vti, raw: a.raw{more}}}
   - render: {{id: b, camera: {{eye: [1.5, 0, 0, 2], projection: parallel, height: 1.5}}, dimensions: [9, 8, 7], shading: flat}}
   - write: {{raw: b.raw}}

@@ -22,7 +22,7 @@ stages:
           color: [0.9, 0.3, 0.1]
         - box: {min: [-0.9, 0.3, -0.8, -0.9], max: [-0.5, 0.8, 0.6, -0.3]}
   - occlusion: {samples: 64}
-  - render: {dimensions: [30, 20, 24]}
+  - render: {dimensions: [30, 20, 24], supersample: 1}
   - write:
       vti: image.vti
       raw: image.raw

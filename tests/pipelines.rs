@@ -49,11 +49,11 @@ fn every_pipeline_leaves_what_it_promises() {
                 // Something is seen and something isn't; and where there is occlusion, there are many greys: the
                 // thesis's all or nothing would be two.
                 let opacity = image.array("opacity").unwrap().values.to_f64();
-                let seen = opacity.iter().filter(|&&o| o == 1.0).count();
+                let seen = opacity.iter().filter(|&&o| o > 0.0).count();
                 assert!(seen * 200 > voxels && seen < voxels, "{}: {seen} of {voxels}", path.display());
                 let values = image.array("ambient_occlusion").unwrap().values.to_f64();
                 let mut greys: Vec<f64> =
-                    values.into_iter().zip(&opacity).filter(|(_, o)| **o == 1.0).map(|(a, _)| a).collect();
+                    values.into_iter().zip(&opacity).filter(|(_, o)| **o > 0.0).map(|(a, _)| a).collect();
                 greys.sort_by(f64::total_cmp);
                 greys.dedup();
                 let published = render.occlusion.is_some_and(|o| match &pipeline.plan[o].source {
@@ -66,7 +66,8 @@ fn every_pipeline_leaves_what_it_promises() {
                 let flat = matches!(render.shading, Shading::Flat);
                 let right = match (render.occlusion.is_some(), published, apart) {
                     (false, ..) => greys == [1.0],
-                    (true, true, true) => greys.len() >= 2 && greys.iter().all(|g| !(0.1..1.0).contains(g)),
+                    // And means of both where a voxel sees both.
+                    (true, true, true) => greys[0] < 0.1 && greys.ends_with(&[1.0]),
                     (true, false, true) => greys[0] > 0.98,
                     (true, true, false) => greys[0] < 0.9,
                     // A mean a simplex, of two simplices; everywhere else many greys.

@@ -25,7 +25,7 @@ fn a_session_makes_what_a_run_writes() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/two_tetrahedra.yaml");
     let out = tempfile::tempdir().unwrap();
     // A session's pictures are looked at once a voxel, and nothing looks at neighbours, unless its caller says so.
-    let plain = ["with-ao.supersample=1".to_owned(), "with-ao.dilate=0".to_owned()];
+    let plain = ["shading=smooth", "supersample=1", "dilate=0"].map(|plain| format!("with-ao.{plain}"));
     let pipeline = Pipeline::load(path.as_ref(), &plain, Some(out.path().to_owned())).unwrap();
     run(&pipeline, &Settings::default(), &Silent).unwrap();
     let Some(AnyMesh::Four(mesh)) = pipeline.prepare(|_| true).unwrap().meshes.remove(0) else { panic!("not in 4D") };

@@ -29,12 +29,14 @@ impl<const D: usize> Tracer<D> {
         let mut normal: Option<Vector<D>> = None;
         self.bvh().within(near, |other| {
             let corners = mesh.corners(other);
-            if other != first && near(&Aabb::of(&corners)) && corners.iter().all(|c| plane_side(&own, c) == 0) {
-                // Seen from far above the point, the other simplex is straight below.
+            if other != first && near(&Aabb::of(&corners)) {
+                // Seen from far above the point, the other simplex is straight below. Most neighbours are not, which is
+                // told quickly; that those of a flat face lie in one hyperplane takes exact arithmetic.
                 let normal = normal.get_or_insert_with(|| unit(&normal_of(&own.map(|c| widen(&c)))));
                 let height = corners.iter().map(|c| (c - position).amax()).fold(0.0, f32::max);
                 let above = narrow(&(widen(position) + widen(normal) * f64::from(height)));
-                if Cone::of_simplex(&above, &corners).contains(&-*normal) {
+                let below = || Cone::of_simplex(&above, &corners).contains(&-*normal);
+                if below() && corners.iter().all(|c| plane_side(&own, c) == 0) {
                     found.push(other);
                 }
             }

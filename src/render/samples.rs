@@ -26,6 +26,10 @@ pub(super) struct Sampling {
     pub fine: Grid,
     /// Where each sample of the voxel (0, 0, 0) is in the finer image.
     offsets: Vec<usize>,
+    /// Where each is among the others, along each axis.
+    places: Vec<[usize; 3]>,
+    /// All of them as one group's `sums`.
+    sums: [usize; 3],
     /// The samples of a voxel by their distance from its centre, nearest first.
     by_distance: Vec<usize>,
 }
@@ -44,28 +48,22 @@ impl Sampling {
     pub fn new<const D: usize>(camera: &Camera<D>, grid: &Grid, samples: usize) -> Self {
         let per_axis = std::array::from_fn(|a| if a < D - 1 { samples } else { 1 });
         let fine = camera.grid(std::array::from_fn(|a| grid.dimensions[a] * per_axis[a]));
-        let mut sampling = Self { per_axis, grid: *grid, fine, offsets: Vec::new(), by_distance: Vec::new() };
-        let offset = |[x, y, z]: [usize; 3]| x + fine.dimensions[0] * (y + fine.dimensions[1] * z);
-        let offsets = (0..sampling.count()).map(|n| offset(sampling.place(n))).collect();
+        let [x, y, z] = per_axis;
+        let places: Vec<[usize; 3]> = (0..x * y * z).map(|n| [n % x, n / x % y, n / x / y]).collect();
+        let offsets = places.iter().map(|[x, y, z]| x + fine.dimensions[0] * (y + fine.dimensions[1] * z)).collect();
+        let sums = std::array::from_fn(|a| places.iter().map(|place| place[a]).sum());
         let distance = |n: usize| -> usize {
             // Twice the distance from the middle is a whole number.
-            sampling.place(n).iter().zip(per_axis).map(|(&i, count)| (2 * i + 1).abs_diff(count).pow(2)).sum()
+            places[n].iter().zip(per_axis).map(|(&i, count)| (2 * i + 1).abs_diff(count).pow(2)).sum()
         };
-        let mut order: Vec<usize> = (0..sampling.count()).collect();
-        order.sort_by_key(|&n| (distance(n), n));
-        (sampling.offsets, sampling.by_distance) = (offsets, order);
-        sampling
+        let mut by_distance: Vec<usize> = (0..places.len()).collect();
+        by_distance.sort_by_key(|&n| (distance(n), n));
+        Self { per_axis, grid: *grid, fine, offsets, places, sums, by_distance }
     }
 
     /// Samples of a voxel.
     pub fn count(&self) -> usize {
-        self.per_axis.iter().product()
-    }
-
-    /// Where a sample of a voxel is among the others, along each axis.
-    fn place(&self, n: usize) -> [usize; 3] {
-        let [x, y, _] = self.per_axis;
-        [n % x, n / x % y, n / x / y]
+        self.offsets.len()
     }
 
     /// What the samples of some layers of voxels see.
@@ -89,12 +87,18 @@ impl Sampling {
         groups.clear();
         let ([x, y, z], [width, height, _]) = (self.per_axis, self.fine.dimensions);
         let samples = &found[i * x + width * (j * y + height * layer * z)..];
-        for (n, &offset) in self.offsets.iter().enumerate() {
+        let first = samples[0];
+        if self.offsets.iter().all(|&offset| samples[offset] == first) {
+            // As of most voxels.
+            let group = Group { simplex: first, count: self.count(), sums: self.sums };
+            groups.extend((first != NOTHING).then_some(group));
+            return groups.first().map(|group| (self.by_distance[0], group.simplex));
+        }
+        for (&place, &offset) in self.places.iter().zip(&self.offsets) {
             let simplex = samples[offset];
             if simplex == NOTHING {
                 continue;
             }
-            let place = self.place(n);
             match groups.iter_mut().find(|group| group.simplex == simplex) {
                 Some(group) => {
                     group.count += 1;
@@ -120,7 +124,7 @@ impl Sampling {
 
     /// The ray of a sample of a voxel (i, j, k) of the image.
     pub fn ray<const D: usize>(&self, camera: &Camera<D>, index: [usize; 3], n: usize) -> Ray<D> {
-        let place = self.place(n);
+        let place = self.places[n];
         let middle = (0..3).all(|a| 2 * place[a] + 1 == self.per_axis[a]);
         if middle {
             return camera.voxel_ray(&self.grid, index);

@@ -32,6 +32,8 @@ use crate::trace::Sampling;
 
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
+/// Images that would have more samples than this are not supersampled unless that is asked for: 270^3 voxels of 27.
+const MANY_SAMPLES: usize = 1 << 29;
 /// The most layers of empty voxels that take over values.
 const MAX_DILATION: usize = 16;
 /// The standard error that a voxel may have, unless it is said otherwise.
@@ -64,7 +66,7 @@ pub struct RenderSpec {
     /// rays are asked, as many as a vertex takes at most.
     pub tolerance: Option<f64>,
     /// Samples of a voxel along each axis; opacity, colour, occlusion and depth are means over those that see something
-    /// (default 1).
+    /// (default 3; 1 with `lights`, where each sample looks for shadows of its own, and from 270^3 voxels on).
     #[schemars(range(min = 1, max = 8))]
     pub supersample: Option<u64>,
     /// Layers of empty voxels around bodies that take over the bodies' colour and occlusion, so that contours and volume
@@ -240,8 +242,13 @@ impl Stage for RenderPlan {
             Some(n) if (least as u64..=most as u64).contains(&n) => Ok(n as usize),
             Some(n) => Err(Invalid::new(format!("{path}.{key}"), format!("expected {least} to {most}, found {n}"))),
         };
-        let supersample = within("supersample", spec.supersample, 1, 1, MOST_SAMPLES)?;
-        if dimensions.iter().any(|&d| (d * supersample) as u64 > MAX_DIMENSION) {
+        let fits = |samples: usize| dimensions.iter().all(|&d| (d * samples) as u64 <= MAX_DIMENSION);
+        let axes = dimension.pick(2, 3);
+        let samples = dimensions.iter().product::<usize>().saturating_mul(3usize.pow(axes));
+        // With lights each sample looks for shadows of its own.
+        let usual = if spec.lights.is_none() && samples <= MANY_SAMPLES && fits(3) { 3 } else { 1 };
+        let supersample = within("supersample", spec.supersample, usual, 1, MOST_SAMPLES)?;
+        if !fits(supersample) {
             let message =
                 format!("with {supersample} samples along each axis an image has at most {MAX_DIMENSION} of them");
             return Err(Invalid::new(format!("{path}.supersample"), message));

@@ -36,24 +36,41 @@ struct Value<const D: usize> {
 }
 
 impl<const D: usize> Value<D> {
-    const NONE: Self = Self {
-        weight: 0.0,
-        albedo: [0.0; 3],
-        direct: [0.0; 3],
-        occlusion: 0.0,
-        direction: Vector::from_array_storage(nalgebra::ArrayStorage([[0.0; D]])),
-        hidden: [0.0; 3],
+    fn nothing() -> Self {
+        let black = [0.0; 3];
+        Self { weight: 0.0, albedo: black, direct: black, occlusion: 0.0, direction: Vector::zeros(), hidden: black }
+    }
+}
+
+/// The empty voxels that have a neighbour, be it at a corner, that is not.
+fn rim(filled: &[u8], [width, height, _]: [usize; 3]) -> Vec<usize> {
+    // Whether a voxel or one beside it is filled, along x, then y, then z: each pass takes the last one's word.
+    let layer = (width * height).max(1);
+    let spread = |from: &[u8], stride: usize, run: usize| {
+        let mut to = from.to_vec();
+        to.par_chunks_mut(run).zip(from.par_chunks(run)).for_each(|(to, from)| {
+            let beside = from.len().saturating_sub(stride);
+            to[..beside].iter_mut().zip(&from[from.len() - beside..]).for_each(|(a, b)| *a |= b);
+            let start = to.len() - beside;
+            to[start..].iter_mut().zip(from).for_each(|(a, b)| *a |= b);
+        });
+        to
     };
+    let rows = spread(filled, 1, width.max(1));
+    let layers = spread(&rows, width, layer);
+    let near = spread(&layers, layer, filled.len().max(1));
+    let voxels = (0..filled.len()).into_par_iter().with_min_len(4096);
+    voxels.filter(|&n| filled[n] == 0 && near[n] != 0).collect()
 }
 
 /// Takes some layers one step further: every voxel without a value that has a neighbour with one.
-fn step<const D: usize>(values: &[Value<D>], dimensions: [usize; 3]) -> Vec<Value<D>> {
+fn step<const D: usize>(values: &mut [Value<D>], filled: &mut [u8], dimensions: [usize; 3]) {
     let [width, height, _] = dimensions;
     let layers = values.len() / (width * height).max(1);
     let near = |i: usize, end: usize| i.saturating_sub(1)..=(i + 1).min(end - 1);
-    let filled = |n: usize| {
+    let mean = |n: usize| {
         let (i, j, k) = (n % width, n / width % height, n / width / height);
-        let (mut sum, mut total) = (Value::<D>::NONE, 0.0f32);
+        let (mut sum, mut total) = (Value::<D>::nothing(), 0.0f32);
         for (z, y) in near(k, layers).flat_map(|z| near(j, height).map(move |y| (z, y))) {
             for x in near(i, width) {
                 let value = &values[x + width * (y + height * z)];
@@ -72,15 +89,15 @@ fn step<const D: usize>(values: &[Value<D>], dimensions: [usize; 3]) -> Vec<Valu
                 sum.direction += value.direction * weight;
             }
         }
-        if total == 0.0 {
-            return Value::NONE;
-        }
         let [albedo, direct, hidden] = [sum.albedo, sum.direct, sum.hidden].map(|sum| sum.map(|c| c / total));
         let (occlusion, direction) = (sum.occlusion / total, sum.direction / total);
         Value { weight: 1.0, albedo, direct, occlusion, direction, hidden }
     };
-    let next = values.par_iter().enumerate().with_min_len(1024);
-    next.map(|(n, value)| if value.weight > 0.0 { *value } else { filled(n) }).collect()
+    let found: Vec<(usize, Value<D>)> =
+        rim(filled, dimensions).into_par_iter().with_min_len(256).map(|n| (n, mean(n))).collect();
+    for (n, value) in found {
+        (values[n], filled[n]) = (value, 1);
+    }
 }
 
 impl<const D: usize> ImageFilter<D> for Dilate {
@@ -98,16 +115,17 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         let value = |i: usize| {
             let (weight, albedo, occlusion) = (input.coverage[i], input.albedo[i], input.occlusion[i]);
             let direct = input.direct.get(i).copied().unwrap_or_default();
-            let direction = input.direction.get(i).copied().unwrap_or(Value::NONE.direction);
+            let direction = input.direction.get(i).copied().unwrap_or_else(Vector::zeros);
             let hidden = input.hidden.get(i).copied().unwrap_or_default();
             Value { weight, albedo, direct, occlusion, direction, hidden }
         };
         let mut values: Vec<Value<D>> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
+        let mut filled: Vec<u8> = values.iter().map(|value| u8::from(value.weight > 0.0)).collect();
         for _ in 0..self.layers {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
             }
-            values = step(&values, input.dimensions());
+            step(&mut values, &mut filled, input.dimensions());
         }
         let range = input.range(&out.layers());
         for (i, value) in values[range].iter().enumerate() {
