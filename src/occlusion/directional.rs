@@ -101,7 +101,8 @@ impl Estimator {
                 found.vectors[i] = narrow(&gathered.vector);
             }
             if let Some(bounced) = &mut found.bounced {
-                bounced.set(i, gathered, known[place].map(|(value, _)| value));
+                let value = f64::from(found.estimates.values[i]);
+                bounced.set(i, gathered, known[place].map(|_| value));
             }
         }
         Ok(found)
