@@ -53,13 +53,13 @@ fn directional<const D: usize>(
 }
 
 fn vectors_by_rays_and_in_closed_form<const D: usize>() {
-    for (count, size) in [(12, 0.8), (40, 0.5)] {
+    for (count, size) in [(12, 0.8), (24, 0.5)] {
         let backend = backend(mesh(&[soup::<D>(7, count, size)]));
         let points = points(backend.tracer().mesh());
         let exact = directional(EXACT, &backend, &points, None);
         let mut squares = 0.0;
         for sampler in [Sampler::Sobol, Sampler::Random] {
-            let sampling = Sampling { sampler, ..Sampling::new(4096, 3) };
+            let sampling = Sampling { sampler, ..Sampling::new(1024, 3) };
             let sampled = directional(Estimator::Sampled(sampling), &backend, &points, None);
             // A is the same with directions and without.
             let alone = Estimator::Sampled(sampling).estimate(&backend, &points, None, &Silent).unwrap();
@@ -67,12 +67,12 @@ fn vectors_by_rays_and_in_closed_form<const D: usize>() {
             for (i, (a, b)) in sampled.vectors.iter().zip(&exact.vectors).enumerate() {
                 let off = f64::from((a - b).norm());
                 squares += if sampler == Sampler::Sobol { off * off } else { 0.0 };
-                assert!(off < 4.0 / 64.0, "{sampler:?} {i}: {a} {b}");
+                assert!(off < 4.0 / 32.0, "{sampler:?} {i}: {a} {b}");
             }
         }
         let rms = (squares / points.len() as f64).sqrt();
-        println!("{D}D, {count} simplices: b by 4,096 rays is {rms:.1e} off");
-        assert!(rms < 2e-3, "{rms}");
+        println!("{D}D, {count} simplices: b by 1,024 rays is {rms:.1e} off");
+        assert!(rms < 8e-3, "{rms}");
         // The estimator that chooses between the two is one of them at each point.
         let adaptive = directional(Estimator::Adaptive(Sampling::new(16, 3)), &backend, &points, None);
         let closed = (0..points.len()).filter(|&i| adaptive.estimates.errors[i] == 0.0);
@@ -83,10 +83,10 @@ fn vectors_by_rays_and_in_closed_form<const D: usize>() {
 
 /// Rays that each bring the light of where they go.
 fn a_linear_sky_is_lit_exactly<const D: usize>() {
-    let backend = backend(mesh(&[soup::<D>(3, 20, 0.7)]));
+    let backend = backend(mesh(&[soup::<D>(3, 12, 0.7)]));
     let points = points(backend.tracer().mesh());
     let gradient = Vector64::<D>::from_fn(|r, _| [0.5, -0.6, 0.3, 0.4][r]);
-    let sampling = Sampling::new(1 << 12, 9);
+    let sampling = Sampling::new(1 << 10, 9);
     let found = directional(EXACT, &backend, &points, None);
     let by_rays = directional(Estimator::Sampled(sampling), &backend, &points, None);
     let (mut squares, mut alone) = (0.0, 0.0);
@@ -110,12 +110,12 @@ fn a_linear_sky_is_lit_exactly<const D: usize>() {
     }
     let [squares, alone] = [squares, alone].map(|s| (s / points.len() as f64).sqrt());
     println!("{D}D: A + g . b is {squares:.1e} off the rays' light, A alone {alone:.1e}");
-    assert!(squares < 2e-3 && alone > 0.05, "{squares} {alone}");
+    assert!(squares < 8e-3 && alone > 0.05, "{squares} {alone}");
 }
 
 /// If all that is hit sends the same light, the bounce is that times what is hidden, be the rays few or many.
 fn surfaces_of_one_radiosity<const D: usize>() {
-    let backend = backend(mesh(&[soup::<D>(5, 30, 0.6)]));
+    let backend = backend(mesh(&[soup::<D>(5, 16, 0.6)]));
     let points = points(backend.tracer().mesh());
     let sent = vec![[0.25f32, 0.5, 1.0]; backend.tracer().mesh().vertices.len()];
     for estimator in [EXACT, Estimator::Sampled(Sampling::new(64, 1)), Estimator::Adaptive(Sampling::new(64, 1))] {
@@ -190,7 +190,7 @@ fn an_endless_fold<const D: usize>() {
     sheet(&mut builder, &floor, D - 1, 1000.0, [0.0, 1.0, 0.0]);
     sheet(&mut builder, &wall, 0, 1000.0, [1.0, 0.5, 0.0]);
     let session = Session::new(builder.finish());
-    let estimator = Estimator::Sampled(Sampling::new(1024, 1));
+    let estimator = Estimator::Sampled(Sampling::new(256, 1));
     let found = session.directional(estimator, &Silent).unwrap();
     let (sent, _) = session.bounced(estimator, &found, &Vector64::zeros(), &Silent).unwrap();
     // A point of the floor, close to the wall. It is near the middle of the sheets, on the floor's side of the wall.
@@ -199,14 +199,14 @@ fn an_endless_fold<const D: usize>() {
     let normal = Vector::<D>::from_fn(|r, _| f32::from(u8::from(r == D - 1)));
     let simplex = (0..mesh.simplices.len() as u32).find(|&s| mesh.object_of(s) == 0).unwrap();
     let point = ShadingPoint::Inside { position, normal, simplex, number: 5 };
-    let rays = Estimator::Sampled(Sampling::new(1 << 14, 2));
+    let rays = Estimator::Sampled(Sampling::new(1 << 12, 2));
     let lit = rays.directional(&**session.backend().unwrap(), &[point], Some(&sent), &Silent).unwrap();
     let (bounced, open) = (lit.bounced.unwrap(), f64::from(lit.estimates.values[0]));
     let reflectance = to_linear(0.5);
     println!("{D}D fold: A {open}, bounce {:?} +- {}", bounced.light[0], bounced.errors[0]);
     assert!((open - 0.5).abs() < 2e-3, "{open}");
     for (c, expected) in [0.25, reflectance / 4.0, 0.0].into_iter().enumerate() {
-        assert!((f64::from(bounced.light[0][c]) - expected).abs() < 4e-3, "{c}: {:?} {expected}", bounced.light[0]);
+        assert!((f64::from(bounced.light[0][c]) - expected).abs() < 6e-3, "{c}: {:?} {expected}", bounced.light[0]);
     }
     assert_eq!(bounced.behind, 0);
     // Under a sky that is brighter along the wall's normal the wall sends more: half of b along that normal is open.
@@ -216,22 +216,22 @@ fn an_endless_fold<const D: usize>() {
     assert!(in_the_middle.clone().count() > 0);
     for v in in_the_middle {
         let expected = 0.5 + 0.8 * open_vector(&(gradient / 0.8)).norm() / 2.0;
-        assert!((f64::from(brighter[v][0]) - expected).abs() < 5e-3, "{} {expected}", brighter[v][0]);
+        assert!((f64::from(brighter[v][0]) - expected).abs() < 2e-2, "{} {expected}", brighter[v][0]);
     }
 }
 
 /// Of all bounces at least 85 % lie within two standard errors, whatever the sampler.
 fn errors_of_the_bounce_are_calibrated<const D: usize>() {
-    let backend = backend(mesh(&[soup::<D>(11, 40, 0.6)]));
+    let backend = backend(mesh(&[soup::<D>(11, 20, 0.6)]));
     let points = points(backend.tracer().mesh());
     let sent: Vec<[f32; 3]> = (0..backend.tracer().mesh().vertices.len())
         .map(|v| [(v * 7 % 11) as f32 / 10.0, (v * 5 % 7) as f32 / 6.0, 0.5])
         .collect();
     let light =
         |sampling: Sampling| directional(Estimator::Sampled(sampling), &backend, &points, Some(&sent)).bounced.unwrap();
-    let truth = light(Sampling::new(1 << 14, 99));
+    let truth = light(Sampling::new(1 << 12, 99));
     for sampler in [Sampler::Sobol, Sampler::Random] {
-        for samples in [16, 64, 200] {
+        for samples in [16, 60] {
             let (mut within, mut count, mut said, mut real) = (0, 0, 0.0, 0.0);
             for seed in 0..4 {
                 let found = light(Sampling { sampler, ..Sampling::new(samples, seed) });
@@ -284,7 +284,7 @@ fn pictures_under_a_sky<const D: usize>() {
     let (sent, bounced) = (Arc::new(sent), Arc::new(bounced));
     let values = Arc::new(found.estimates.clone());
     let camera = Camera::new(&View { eye: View::<D>::default().eye * 2.5, ..View::default() }).unwrap();
-    let dimensions = if D == 4 { [12, 12, 12] } else { [40, 40, 1] };
+    let dimensions = if D == 4 { [9, 9, 9] } else { [24, 24, 1] };
     let sampling = Sampling::new(16, 2);
     let aovs = [
         Aov::AmbientOcclusion,
@@ -350,7 +350,7 @@ fn pictures_under_a_sky<const D: usize>() {
             reddest = reddest.max(bounce[3 * i] - bounce[3 * i + 1]);
         }
         let nothing = matches!(shading, Shading::None);
-        assert!(seen > 100 && (nothing || lit_by_others * 3 > seen), "{D}D, {name}: {lit_by_others} of {seen}");
+        assert!(seen > 40 && (nothing || lit_by_others * 3 > seen), "{D}D, {name}: {lit_by_others} of {seen}");
         assert!(nothing || reddest > 0.05, "{D}D, {name}: the wall is red, what it lights by {reddest}");
         // Layer by layer it is the same, and a picture that isn't lit shows colour times occlusion as ever.
         let mut slabs: Vec<Array> = Vec::new();
