@@ -174,6 +174,7 @@ fn every_key_counts_or_has_a_reason() {
             "ParaviewSpec",
             "LightSpec",
             "DepthCueSpec",
+            "SkySpec",
         ];
         // Of a new stage nothing is known here yet.
         let kinds = schema["$defs"]["StageSpec"].to_string();

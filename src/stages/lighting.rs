@@ -8,11 +8,13 @@ use serde_json::{Map, Value};
 
 use super::Invalid;
 use super::camera::check_vector;
+use super::describe::grouped;
 use super::range::check_length;
 use crate::geometry::{Dimension, Vector64};
 use crate::render::tone::to_linear;
-use crate::render::{DepthCue, Light, Lighting, Source};
+use crate::render::{DepthCue, Light, Lighting, Skylight, Source};
 use crate::scene::Color;
+use crate::session::Session;
 use crate::text::number;
 
 /// The most lights of a render.
@@ -71,6 +73,19 @@ pub(super) struct LightingKeys<'s> {
     pub specular: Option<f64>,
     pub shininess: Option<f64>,
     pub depth_cue: Option<&'s DepthCueSpec>,
+}
+
+/// What light from the sky and from other surfaces a picture needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightAsked<'a> {
+    /// How it is lit, if it is.
+    pub lighting: Option<&'a LightingPlan>,
+    /// Whether it matters where the sky is open.
+    pub directions: bool,
+    /// Whether other surfaces send light.
+    pub bounce: bool,
+    /// Whether each voxel looks for itself.
+    pub at_voxels: bool,
 }
 
 /// How a render is lit.
@@ -311,6 +326,27 @@ pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>, id: &str) -> Vec<S
     notes
 }
 
+/// What to tell of the light of a picture that was made.
+pub(super) fn light_notes<const D: usize>(light: &Skylight<D>, session: &Session<D>, id: &str) -> Vec<String> {
+    let mut notes = Vec::new();
+    let (hits, behind) = light.seen();
+    if behind > 0 {
+        notes.push(format!(
+            "render {id}: {} of the {} rays that look for light of other surfaces see one from behind, and were told the light \
+             of its front; turn that object by `orientation`, or close it",
+            grouped(behind),
+            grouped(hits)
+        ));
+    }
+    if session.is_on_opencl() {
+        notes.push(format!(
+            "render {id}: open directions and the light of other surfaces were traced on the processor, as OpenCL devices tell \
+             whether rays hit something, not what"
+        ));
+    }
+    notes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -338,7 +374,7 @@ mod tests {
         assert_eq!(warnings.len(), 3, "{warnings:?}");
         assert_eq!(lighting("bounce: 0", 3).unwrap(), (None, vec![]));
         let plan = lighting("bounce: 1\nsky: {gradient: [0, 1, 0]}", 3).unwrap().0.unwrap();
-        assert!(plan.bounce && plan.ambient == 1.0 && plan.gradient::<3>() == Vector64::y());
+        assert!(plan.bounce && plan.ambient == 1.0 && plan.gradient::<3>().as_slice() == [0.0, 1.0, 0.0]);
     }
 
     #[test]
@@ -371,7 +407,10 @@ mod tests {
                 "render.sky.gradient: expected a vector of length 1 at most, found one of length 1.118: the darkest side of the \
                  sky would be darker than black; make it shorter, and `ambient` larger if the picture is to be brighter",
             ),
-            ("sky: {gradient: [0, .nan, 0, 0]}", "render.sky.gradient[1]: expected a finite number, found NaN"),
+            (
+                "sky: {gradient: [0, .nan, 0, 0]}",
+                "render.sky.gradient[1]: expected a number of size up to 1e12, found NaN",
+            ),
             (
                 "bounce: 2",
                 "render.bounce: expected 0 or 1, found 2: light is followed over one reflection, not over more",

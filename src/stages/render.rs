@@ -14,10 +14,9 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
-use super::lighting::{self, DepthCueSpec, LightSpec, LightingKeys, LightingPlan, SkySpec};
+use super::lighting::{self, DepthCueSpec, LightAsked, LightSpec, LightingKeys, LightingPlan, SkySpec};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::scene::ScenePlan;
-use super::skylight::{self, LightAsked};
 use super::subject::scene_and_occlusion;
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
@@ -414,7 +413,7 @@ impl Stage for RenderPlan {
             notes.extend(lighting::in_vain(lighting, plan.id(me)));
         }
         if let Some(skylight) = &picture.skylight {
-            notes.extend(skylight::notes(skylight, &scene.session, plan.id(me)));
+            notes.extend(lighting::light_notes(skylight, &scene.session, plan.id(me)));
         }
         if behind > 0 && picture.shading.is_interpolated() {
             notes.push(format!(

@@ -5,27 +5,12 @@
 
 use std::sync::Arc;
 
-use super::describe::grouped;
-use super::lighting::LightingPlan;
+use super::lighting::{LightAsked, LightingPlan};
 use super::occlusion::OcclusionPlan;
 use super::{Ref, Run, SceneRun, StageError};
 use crate::geometry::Vector64;
 use crate::occlusion::{Directional, Estimator};
 use crate::render::{Skylight, radiosity};
-use crate::session::Session;
-
-/// What light from the sky and from other surfaces a picture needs.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct LightAsked<'a> {
-    /// How it is lit, if it is.
-    pub lighting: Option<&'a LightingPlan>,
-    /// Whether it matters where the sky is open.
-    pub directions: bool,
-    /// Whether other surfaces send light.
-    pub bounce: bool,
-    /// Whether each voxel looks for itself.
-    pub at_voxels: bool,
-}
 
 impl<const D: usize> SceneRun<D> {
     /// The occlusion of all vertices with directions.
@@ -82,27 +67,6 @@ impl<const D: usize> SceneRun<D> {
 fn estimator(of: Ref<OcclusionPlan>, run: &Run) -> Estimator {
     let max_distance = run.loaded.get(&of).map_or(f32::INFINITY, |loaded| loaded.sidecar.max_distance);
     run.plan[of].directional(run.plan.seed, max_distance)
-}
-
-/// What to tell of the light of a picture that was made.
-pub(super) fn notes<const D: usize>(light: &Skylight<D>, session: &Session<D>, id: &str) -> Vec<String> {
-    let mut notes = Vec::new();
-    let (hits, behind) = light.seen();
-    if behind > 0 {
-        notes.push(format!(
-            "render {id}: {} of the {} rays that look for light of other surfaces see one from behind, and were told the light \
-             of its front; turn that object by `orientation`, or close it",
-            grouped(behind),
-            grouped(hits)
-        ));
-    }
-    if session.is_on_opencl() {
-        notes.push(format!(
-            "render {id}: open directions and the light of other surfaces were traced on the processor, as OpenCL devices tell \
-             whether rays hit something, not what"
-        ));
-    }
-    notes
 }
 
 #[cfg(test)]
