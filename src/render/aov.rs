@@ -144,7 +144,9 @@ fn color<const D: usize>(buffer: &GBuffer<D>, i: usize) -> [f32; 3] {
 /// What reaches the eye: ambient light, as far as it is not occluded or comes from other surfaces, and that of lights.
 fn light<const D: usize>(buffer: &GBuffer<D>, i: usize) -> [f32; 3] {
     let (albedo, occlusion) = (buffer.albedo[i], buffer.occlusion[i]);
-    let ambient = buffer.irradiance.get(i).copied().unwrap_or([occlusion; 3]);
+    // A picture that isn't lit shows occlusion, whatever arrays it has beside.
+    let irradiance = buffer.irradiance.get(i).filter(|_| buffer.columns().contains(Columns::DIRECT));
+    let ambient = irradiance.copied().unwrap_or([occlusion; 3]);
     let direct = buffer.direct.get(i).copied().unwrap_or_default();
     std::array::from_fn(|c| (albedo[c] * ambient[c] + direct[c]).min(f32::MAX))
 }
