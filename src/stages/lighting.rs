@@ -408,10 +408,6 @@ mod tests {
                  sky would be darker than black; make it shorter, and `ambient` larger if the picture is to be brighter",
             ),
             (
-                "sky: {gradient: [0, .nan, 0, 0]}",
-                "render.sky.gradient[1]: expected a number of size up to 1e12, found NaN",
-            ),
-            (
                 "bounce: 2",
                 "render.bounce: expected 0 or 1, found 2: light is followed over one reflection, not over more",
             ),
