@@ -19,7 +19,7 @@ use ao4d::pipeline::Pipeline;
 use ao4d::progress::Silent;
 use ao4d::render::filters::denoise::Refine;
 use ao4d::render::filters::{ImageFilter, denoise};
-use ao4d::render::{Aov, Renderer, Shading, Slab};
+use ao4d::render::{Aov, Renderer, ScreenSpace, Shading, Slab};
 use ao4d::stages::camera::camera;
 use ao4d::stages::render::RenderPlan;
 use ao4d::stages::scene::AnyMesh;
@@ -121,6 +121,11 @@ fn measure<const D: usize>(name: &str, pipeline: &Pipeline, mesh: Mesh<D>, longe
             let told = tolerance.map_or(String::new(), |t| format!(", to {t}"));
             row(&format!("auto, {own} a voxel{told}"), rays, asked, image(auto));
         }
+    }
+    for (slices, steps) in [(8, 8), (16, 16), (32, 16), (64, 32)] {
+        let settings = ScreenSpace { slices, steps, ..ScreenSpace::default() };
+        let name = format!("screen_space, {slices} slices x {steps} steps");
+        row(&name, 0, count, image(|| renderer(Shading::ScreenSpace(settings))));
     }
     for rays in [1, 4, 16, 64] {
         row("voxel", rays, count, image(|| renderer(Shading::Voxel(by_rays(rays)))));

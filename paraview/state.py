@@ -10,6 +10,8 @@
 
 import math
 import os
+import shutil
+import subprocess
 import sys
 
 import paraview
@@ -20,8 +22,11 @@ import paraview.simple
 
 # ---------------------------------------------------------------------------------------------- the figure: edit here
 
-# The volumes from left to right; files beside this one.
+# The volumes from left to right; files beside this one. A `.pvd` is an animation: a list of volumes with their times.
 PANELS = @PANELS@
+# How many frames the animations have, and how many of them a second; None if there is no animation.
+FRAMES = @FRAMES@
+RATE = @RATE@
 # 'vti', or 'raw' for float32 triples without a header.
 SOURCE = @SOURCE@
 # None, ('octant', its corner or None for the middle), or ('plane', 0 to 2 for x to z, position).
@@ -97,8 +102,24 @@ def read_raw(panel):
     return reader
 
 
+def is_animation(panel):
+    return panel['file'].endswith('.pvd')
+
+
+def frame_times():
+    """The times of the frames; of a figure without animations the one time there is."""
+    return [k / RATE for k in range(FRAMES)] if FRAMES else [0.0]
+
+
+def read_pvd(panel):
+    return PVDReader(registrationName=panel['file'], FileName=locate_file(panel['file']))
+
+
 def read_panel(panel):
-    reader = read_raw(panel) if SOURCE == 'raw' else read_vti(panel)
+    if is_animation(panel):
+        reader = read_pvd(panel)
+    else:
+        reader = read_raw(panel) if SOURCE == 'raw' else read_vti(panel)
     reader.UpdatePipeline()
     extent = reader.GetDataInformation().GetExtent()
     found = [extent[2 * a + 1] - extent[2 * a] + 1 for a in range(3)]
@@ -141,8 +162,9 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 points, cells = self.GetInputDataObject(0, 0), self.GetOutputDataObject(0)
 extent, origin, spacing = list(points.GetExtent()), list(points.GetOrigin()), points.GetSpacing()
 arrays = points.GetPointData()
-if arrays.HasArray('opacity'):
-    shown = vtk_to_numpy(arrays.GetArray('opacity')) >= 0.5
+seen = [name for name in ('coverage', 'opacity') if arrays.HasArray(name)]
+if seen:
+    shown = vtk_to_numpy(arrays.GetArray(seen[0])) >= 0.5
 elif arrays.HasArray('rgba'):
     shown = vtk_to_numpy(arrays.GetArray('rgba'))[:, 3] >= 128
 else:  # the background alone is pure white
@@ -196,8 +218,14 @@ def shown_cells(cells, name):
     return f
 
 
+# What `body_points` found, by the file's name.
+POINTS = {}
+
+
 def body_points(reader, panel):
-    """The points (x, y, z) of the opaque voxels, on a coarse grid."""
+    """The points (x, y, z) of the opaque voxels, on a coarse grid; of an animation those of some of its frames."""
+    if panel['file'] in POINTS:
+        return POINTS[panel['file']]
     n = panel['dimensions']
     coarse = ExtractSubset(Input=reader)
     coarse.VOI = [0, n[0] - 1, 0, n[1] - 1, 0, n[2] - 1]
@@ -205,11 +233,27 @@ def body_points(reader, panel):
     cells = points_to_cells(coarse, 'coarse')
     body = shown_cells(cells, 'coarse body')
     centres = CellCenters(Input=body, VertexCells=0)
-    found = servermanager.Fetch(centres)
-    points = [found.GetPoint(k) for k in range(found.GetNumberOfPoints())]
+    moments = frame_times() if is_animation(panel) else [0.0]
+    points = []
+    for time in moments[::len(moments) // 24 + 1]:
+        if is_animation(panel):
+            centres.UpdatePipeline(time)
+        found = servermanager.Fetch(centres)
+        points += [found.GetPoint(k) for k in range(found.GetNumberOfPoints())]
     for proxy in (centres, body, cells, coarse):
         Delete(proxy)
+    POINTS[panel['file']] = points
     return points
+
+
+def frame_over_time(panels, readers):
+    """A box around all bodies in all frames, with a little air."""
+    points = [point for panel, reader in zip(panels, readers) for point in body_points(reader, panel)]
+    if not points:
+        return None
+    air = [2.0 * largest(1, panels[0]['dimensions'][a] // 40) * panels[0]['spacing'][a] for a in range(3)]
+    return [v for a in range(3)
+            for v in (smallest(p[a] for p in points) - air[a], largest(p[a] for p in points) + air[a])]
 
 
 def union_of(boxes):
@@ -428,6 +472,14 @@ def centre_of(panels, readers):
     return centre
 
 
+def prepare_time():
+    """Lets ParaView play the frames, and shows the first."""
+    scene = GetAnimationScene()
+    scene.UpdateAnimationUsingDataTimeSteps()
+    setp(scene, PlayMode='Snap To TimeSteps')
+    scene.AnimationTime = 0.0
+
+
 def build_figure():
     """Builds the layout; returns it and the picture's size."""
     if not PANELS:
@@ -438,6 +490,8 @@ def build_figure():
 
     prepare_colours()
     readers = [read_panel(panel) for panel in PANELS]
+    if FRAMES:
+        prepare_time()
     arrays = [colour_array(reader, panel) for reader, panel in zip(readers, PANELS)]
     layout = CreateLayout(name='Figure')
     cells = [cell for row in split_cell(layout, 0, rows, False) for cell in split_cell(layout, row, columns, True)]
@@ -472,9 +526,38 @@ def save_picture(layout, size):
         os.makedirs(os.path.dirname(target))
     for d in BILLBOARDS:  # of all text only these do not grow with the picture
         setp(d, FontSize=int(text_size() * size[0] / layout_size()[0] + 0.5))
-    SaveScreenshot(target, layout, ImageResolution=size, SeparatorWidth=0, SeparatorColor=[1.0, 1.0, 1.0],
-                   FontScaling='Scale fonts proportionally')
-    print('wrote ' + target)
+    stem = os.path.splitext(target)[0]
+    for k, time in enumerate(frame_times()):
+        name = '%s_%04d.png' % (stem, k) if FRAMES else target
+        if FRAMES:
+            GetAnimationScene().AnimationTime = time
+        SaveScreenshot(name, layout, ImageResolution=size, SeparatorWidth=0, SeparatorColor=[1.0, 1.0, 1.0],
+                       FontScaling='Scale fonts proportionally')
+        print('wrote ' + name)
+        if FRAMES and k == 0:
+            shutil.copyfile(name, target)
+            print('wrote ' + target)
+    if FRAMES:
+        make_film(stem)
+
+
+def make_film(stem):
+    """A film of the frames, where ffmpeg is installed; else a line that says how it is made."""
+    film, unfinished = stem + '.mp4', stem + '.partial.mp4'
+    command = ['ffmpeg', '-y', '-loglevel', 'error', '-framerate', repr(RATE),
+               '-i', stem.replace('%', '%%') + '_%04d.png', '-frames:v', str(FRAMES),
+               '-vf', 'pad=ceil(iw/2)*2:ceil(ih/2)*2', '-pix_fmt', 'yuv420p']
+    if shutil.which('ffmpeg') is None:
+        print('ffmpeg is not installed; with it, this makes a film of the frames:')
+        print('  ' + ' '.join("'%s'" % part.replace("'", "'\\''") for part in command + [film]))
+        return
+    if subprocess.call(command + [unfinished]) == 0:
+        os.replace(unfinished, film)
+        print('wrote ' + film)
+    else:
+        if os.path.exists(unfinished):
+            os.remove(unfinished)
+        print('ffmpeg failed; the frames are there')
 
 
 paraview.simple._DisableFirstRenderCameraReset()

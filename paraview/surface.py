@@ -33,7 +33,10 @@ def array_of(name, *components):
     return None if found is None else vtk_to_numpy(found).reshape(shape + components)
 
 # What is covered, in what colour, by which object.
-rgba, colours, opacity = array_of('rgba', 4), array_of('rgb', 3), array_of('opacity')
+# Where light passes objects, the file tells what is covered apart from what is opaque.
+rgba, colours, opacity = array_of('rgba', 4), array_of('rgb', 3), array_of('coverage')
+if opacity is None:
+    opacity = array_of('opacity')
 occlusion, number = array_of('ambient_occlusion'), array_of('object')
 if opacity is None:  # of a .raw file the background alone is pure white
     opacity = rgba[..., 3] / numpy.float32(255) if rgba is not None else (colours < 1).any(axis=3)
@@ -174,7 +177,7 @@ if out.GetNumberOfPolys() > 0:
 
 
 def panel_width(columns):
-    return 3200 // columns
+    return (1280 if FRAMES else 3200) // columns
 
 
 def bodies_of(reader, name):
@@ -253,7 +256,8 @@ def show_solids(panels, readers, arrays, views, centre, shape):
     bodies = [bodies_of(reader, name) for reader, name in zip(readers, names)]
     for body in bodies:
         body.UpdatePipeline()
-    box = frame_of(bodies) or union_of([grid_bounds(panel) for panel in panels])
+    box = frame_over_time(panels, readers) if FRAMES else frame_of(bodies)
+    box = box or union_of([grid_bounds(panel) for panel in panels])
     cuts = [cut_open(body, name, centre, box) for body, name in zip(bodies, names)]
     if CUT is not None:
         link_cuts(cuts)

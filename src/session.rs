@@ -38,6 +38,11 @@ impl<const D: usize> Session<D> {
         Self { opencl: Some(opencl), ..Self::new(mesh) }
     }
 
+    /// Another scene, whose rays are traced by the same.
+    pub fn with_mesh(&self, mesh: impl Into<Arc<Mesh<D>>>) -> Self {
+        Self { opencl: self.opencl.clone(), ..Self::new(mesh) }
+    }
+
     /// The scene's mesh.
     pub fn mesh(&self) -> &Arc<Mesh<D>> {
         self.tracer.mesh()

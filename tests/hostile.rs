@@ -117,24 +117,39 @@ fn only_regular_files_are_inputs() {
     fifo("fifo.yaml");
     std::fs::write(path("values.f32"), [0; 4]).unwrap();
     fifo("values.f32.yaml");
-    let endings = ["stl", "obj", "ply", "msh", "vtk", "vtu", "raw", "nii", "nii.gz", "tif", "nc", "nrrd", "vti", "f32"];
-    for ending in endings {
+    let meshes = ["stl", "obj", "ply", "msh", "vtk", "vtu", "vtp", "pvtu", "pvtp", "pvd", "vtu.series"];
+    let images = ["raw", "nii", "nii.gz", "hdr", "tif", "nc", "h5", "nrrd", "nhdr", "vti", "pvti", "vti.series", "f32"];
+    let endings = || meshes.into_iter().chain(images);
+    for ending in endings() {
         fifo(&format!("fifo.{ending}"));
         std::os::unix::fs::symlink("/dev/zero", path(&format!("zero.{ending}"))).unwrap();
     }
     for (name, kind) in [("fifo", "not a regular file but a FIFO"), ("zero", "not a regular file but a device")] {
-        for (i, ending) in endings.into_iter().enumerate() {
+        for ending in endings() {
             let file = format!("{name}.{ending}");
-            let yaml = match i {
-                0..6 => pipeline(&format!("{{file: {file}}}")),
-                6..13 => image(&file),
-                _ => load(&file),
+            let yaml = match ending {
+                "f32" => load(&file),
+                _ if meshes.contains(&ending) => pipeline(&format!("{{file: {file}}}")),
+                _ => image(&file),
             };
             std::fs::write(path("p.yaml"), yaml).unwrap();
             for verb in ["check", "run"] {
                 refused(folder.path(), &[verb, "p.yaml"], kind);
             }
             refused(folder.path(), &["info", &file], kind);
+        }
+        // What others name.
+        let part = format!(
+            "<VTKFile type='PUnstructuredGrid'><PUnstructuredGrid><Piece Source='{name}.vtu'/></PUnstructuredGrid></VTKFile>"
+        );
+        let step = format!(
+            "<VTKFile type='Collection'><Collection><DataSet timestep='0' file='{name}.vtu'/></Collection></VTKFile>"
+        );
+        for (list, text) in [("list.pvtu", part), ("list.pvd", step)] {
+            std::fs::write(path(list), text).unwrap();
+            std::fs::write(path("p.yaml"), pipeline(&format!("{{file: {list}}}"))).unwrap();
+            refused(folder.path(), &["check", "p.yaml"], kind);
+            refused(folder.path(), &["info", list], kind);
         }
         std::fs::write(path("d.nhdr"), detached.replace("FILE", &format!("{name}.raw"))).unwrap();
         std::fs::write(path("p.yaml"), image("d.nhdr")).unwrap();

@@ -179,6 +179,29 @@ fn nrrd_axes_and_places() {
         [0.0; 4],
     );
 
+    // One unit for all axes, be they told for those of the file or those of the world.
+    for units in [
+        "spacings: 0.5 1 2 3\nunits: \"cm\" \"mm\" \"m\" \"s\"",
+        "space dimension: 4\nspace directions: (0.5,0,0,0) (0,1,0,0) (0,0,2,0) (0,0,0,3)\nspace units: \"cm\" \"mm\" \"m\" \"s\"",
+    ] {
+        write("units.nrrd", &format!("{usual}{units}"), &content);
+        is_placed(at, json!({"file": "units.nrrd"}), 0.0, [0.5, 0.1, 200.0, 3.0], [0.0; 4]);
+    }
+    // What is listed of axes is listed of all of them.
+    for (field, message) in [
+        ("kinds: domain domain", "2 kinds for 4 axes"),
+        ("spacings: 1 2 3", "3 spacings for 4 axes"),
+        ("axis mins: 1 2 3 4 5", "5 axis mins for 4 axes"),
+        ("space directions: (1,0,0) (0,1,0) (0,0,1)", "3 space directions for 4 axes"),
+    ] {
+        write("short.nrrd", &format!("{usual}{field}"), &content);
+        is_refused(at, json!({"file": "short.nrrd"}), &[message]);
+    }
+    write("short.nrrd", "type: float\ndimension: 4\nsizes: 9 8 35", &content);
+    is_refused(at, json!({"file": "short.nrrd"}), &["the dimension 4, and 3 sizes"]);
+    write("capitals.nrrd", "Type: FLOAT\nDimension: 4\nSizes: 9 8 7 5", &content);
+    is_placed(at, json!({"file": "capitals.nrrd"}), 0.0, [1.0; 4], [0.0; 4]);
+
     // Centres of cells.
     write(
         "cells.nrrd",
@@ -328,6 +351,20 @@ fn nifti_lies_where_its_forms_say() {
         let ((_, volume), (_, its)) = (plain(at, 0.0), extent(at, json!({"file": "a.nii"}), 0.0));
         assert!((its / volume / (m.determinant() * 1.5) - 1.0).abs() < 1e-6, "{its}");
     }
+    // A flat image, whose third step is 0: by the qform that counts as 1, and by the sform nothing lies along it.
+    for form in [
+        Form::Qform { quaternion: [0.0; 3], offset: [0.0; 3], handed: 1.0 },
+        Form::Sform([[2.0, 0.0, 0.0, 0.0], [0.0, 3.0, 0.0, 0.0], [0.0; 4]]),
+    ] {
+        let mut flat = nifti(false, &form, [2.0, 3.0, 0.0, 1.5], &content);
+        for (i, n) in [4u8, 9, 8, 1, 35].into_iter().enumerate() {
+            flat[40 + 2 * i] = n;
+        }
+        std::fs::write(at.join("flat.nii"), flat).unwrap();
+        let opened = ao4d::io::image::open("", at, &["flat.nii".into()], &Default::default()).unwrap();
+        let ends = opened.axes.each_ref().map(|axis| axis.positions.at(axis.size - 1));
+        assert_eq!((opened.frame.is_none(), ends), (true, [16.0, 21.0, 0.0, 51.0]));
+    }
     // A pair of files, and complex numbers.
     let mut pair =
         nifti(false, &Form::Sform([[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]), [1.0; 4], &[]);
@@ -454,6 +491,22 @@ fn netcdf_axes_by_name_and_attribute() {
         [2.0, -1.0, 0.5, 0.25],
         [10.0, 60.0, 0.0, 0.0],
     );
+    // Lengths in several units, by an attribute that alone says what the axes are.
+    let units = ["m", "km", "micrometers", "s"].map(|unit| text("units", unit));
+    let mut mixed: Vec<Variable> = unnamed
+        .iter()
+        .zip([&[0], &[1], &[2], &[3usize]])
+        .zip(units)
+        .map(|(((name, size), dimension), unit)| coordinate(name, dimension, unit, places(*size, 0.0, 2.0)))
+        .collect();
+    for (variable, axis) in mixed.iter_mut().zip(["X", "y", "Z", "T"]) {
+        variable.attributes.push(text("axis", axis));
+    }
+    mixed.push(field(&[3, 1, 0, 2], [2, 0, 1, 3]));
+    write(&netcdf(2, &unnamed, &mixed));
+    is_placed(at, json!({"file": "a.nc"}), 0.0, [2.0, 2e3, 2e-6, 2.0], [0.0; 4]);
+    let (_, notes) = try_build::<4>(at, json!({"file": "a.nc"}), 0.0).unwrap();
+    assert!(notes.iter().any(|note| note.contains("\"b\" is in km; it is brought to m, as \"a\" is")), "{notes:?}");
     // An axis that is nothing of these.
     let band = [("z", 7), ("band", 5), ("y", 8), ("x", 9)];
     write(&netcdf(1, &band, &[field(&[0, 1, 2, 3], [0, 1, 3, 2])]));
@@ -611,6 +664,26 @@ fn tiff_pages_are_what_their_description_says() {
     );
     write(&Pages { description: &text, ..GREY }, &pages(USUAL));
     good([0.5, 1.0, 2.0, 3.0]);
+    // Lengths in units of their own.
+    let text = ome(
+        "XYZTC",
+        "PhysicalSizeX=\"500\" PhysicalSizeXUnit=\"nm\" PhysicalSizeY=\"1\" PhysicalSizeZ=\"0.002\" PhysicalSizeZUnit=\"mm\" \
+         TimeIncrement=\"3\" TimeIncrementUnit=\"ms\"",
+        "",
+    );
+    write(&Pages { description: &text, ..GREY }, &pages(USUAL));
+    good([500.0, 1000.0, 2000.0, 3.0]);
+    // Descriptions that are elsewhere, and planes that are.
+    let text = "<OME UUID=\"urn:1\"><BinaryOnly MetadataFile=\"a.companion.ome\" UUID=\"urn:2\"/></OME>";
+    write(&Pages { description: text, ..GREY }, &pages(USUAL));
+    is_refused(at, json!({"file": "a.tif"}), &["unsupported: its OME-XML is in another file, a.companion.ome"]);
+    let text = ome(
+        "XYZCT",
+        "",
+        "<TiffData FirstT=\"0\" IFD=\"0\" PlaneCount=\"7\"/><TiffData FirstT=\"1\" PlaneCount=\"28\"><UUID FileName=\"b.tif\">urn:3</UUID></TiffData>",
+    );
+    write(&Pages { description: &text, ..GREY }, &pages(USUAL)[..7]);
+    is_refused(at, json!({"file": "a.tif"}), &["unsupported: planes in another file, b.tif"]);
     // Time fastest over the pages, whatever dimensions are asked for.
     let text = ome("XYCTZ", "", "");
     write(&Pages { description: &text, ..GREY }, &pages([0, 1, 3, 2]));
@@ -727,8 +800,63 @@ fn files_of_a_sequence_share_one_grid() {
     is_placed(at, counted, 0.0, [2.0, 1.0, 0.5, 1.0], [10.0, 20.0, 30.0, 7.0]);
     write(3, "Origin=\"10 20 30\" Spacing=\"2 1 1\"", Some(16.0));
     is_refused(at, files.clone(), &["a3.vti", "along z", "a0.vti"]);
+    // What nobody asks for may be of any kind, and may be damaged.
+    let odd = [
+        ("<Array type=\"String\" Name=\"s\" format=\"ascii\">65 0</Array>", true),
+        ("<DataArray type=\"Int8\" Name=\"m\" format=\"ascii\">1</DataArray>", false),
+    ];
+    for (array, without_name) in odd {
+        let text = std::fs::read_to_string(at.join("a0.vti"))
+            .unwrap()
+            .replace("</PointData>", &format!("{array}</PointData>"));
+        std::fs::write(at.join("odd.vti"), text).unwrap();
+        try_build::<3>(at, json!({"file": "odd.vti", "array": "f"}), 0.0).unwrap();
+        assert_eq!(try_build::<3>(at, json!({"file": "odd.vti"}), 0.0).is_ok(), without_name, "{array}");
+        is_refused(
+            at,
+            json!({"file": "odd.vti", "array": "g"}),
+            &[if without_name { "there are f" } else { "array `m`" }],
+        );
+    }
+    // Values of cells lie at their middles.
+    let cells = std::fs::read_to_string(at.join("a0.vti")).unwrap().replace("0 8 0 7 0 6", "0 9 0 8 0 7");
+    let text = "<Array type=\"String\" Name=\"s\" format=\"ascii\">65 0</Array><DataArray type=\"Int8\" Name=\"m\" format=\"ascii\">1</DataArray>";
+    let cells = cells.replace("PointData>", "CellData>").replace("<FieldData>", &format!("<FieldData>{text}"));
+    std::fs::write(at.join("cells.vti"), cells).unwrap();
+    let opened = ao4d::io::image::open("", at, &["cells.vti".into()], &Default::default()).unwrap();
+    assert_eq!(
+        opened.axes.each_ref().map(|axis| (axis.size, axis.positions.at(0))),
+        [(9, 11.0), (8, 20.5), (7, 30.25), (1, 7.0)]
+    );
+    // Points that are hidden, or lie outside of what was resampled, have no value.
+    let whole = std::fs::read_to_string(at.join("a0.vti")).unwrap();
+    for (name, usual, odd) in [("vtkGhostType", "1", "3"), ("vtkValidPointMask", "1", "0")] {
+        let marks: Vec<&str> = (0..504).map(|i| if i < 5 { odd } else { usual }).collect();
+        let array =
+            format!("<DataArray type=\"UInt8\" Name=\"{name}\" format=\"ascii\">{}</DataArray>", marks.join(" "));
+        std::fs::write(at.join("marked.vti"), whole.replace("</PointData>", &(array + "</PointData>"))).unwrap();
+        let opened = ao4d::io::image::open("", at, &["marked.vti".into()], &Default::default());
+        let mut opened = opened.unwrap();
+        let mut values = vec![0.0; 504];
+        opened.values.read(&mut values).unwrap();
+        assert!(values.iter().enumerate().all(|(i, value)| value.is_nan() == (i < 5)), "{name}");
+        assert!(opened.notes[0].contains("5 of its points are marked"), "{:?}", opened.notes);
+    }
     write(3, "Origin=\"10 20 30\" Spacing=\"2 1 0.5\"", Some(1.0));
     is_refused(at, files.clone(), &["times don't go on", "7.0, 10.0, 13.0, 1.0"]);
+    // In units of one kind.
+    for (i, unit) in ["mm", "millimeter", "um"].into_iter().enumerate() {
+        let header = format!(
+            "type: float\ndimension: 3\nsizes: 9 8 7\nspacings: 1 1 1\nunits: \"{unit}\" \"{unit}\" \"{unit}\""
+        );
+        std::fs::write(at.join(format!("u{i}.nrrd")), nrrd(&header, &little(&all[504 * i..504 * (i + 1)]))).unwrap();
+    }
+    try_build::<4>(at, json!({"files": ["u0.nrrd", "u1.nrrd"]}), 0.0).unwrap();
+    is_refused(
+        at,
+        json!({"files": ["u0.nrrd", "u1.nrrd", "u2.nrrd"]}),
+        &["u2.nrrd: is in um along x, not in mm", "u0.nrrd"],
+    );
     // A quarter of a turn about z.
     (0..5).for_each(|i| write(i, "Direction=\"0 -1 0 1 0 0 0 0 1\"", None));
     let ((box_, _), (found, _)) = (plain(at, 0.0), extent(at, files, 0.0));

@@ -23,7 +23,7 @@ stages:
   - occlusion: {id: loaded, input: s, load: v.f32}
   - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
   - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
-  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
+  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, layers: 2, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
   - render: {id: mended, occlusion: o2, dimensions: [3, 4, 5], shading: auto}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
@@ -32,6 +32,10 @@ stages:
   - slice: {id: c, input: s, occlusion: none, normal: [0, 0, 0, 1], at: 0.1, vtp: c.vtp}
   - slice: {id: cs, input: s, occlusion: none, range: [0, 1], count: 3, vtp: cs.vtp}
   - wireframe: {id: wire, input: r, edges: feature, angle: 20, near: 0.1, vtp: wire.vtp}
+  - animate: {id: an, input: r, frames: 3, moves: scene, turn: {plane: xw, from: 0, to: 90, center: [0, 0, 0, -1]}, move: {from: [0, 0, 0, 0], to: [0, 0, 0, 1]}, scan: [0, 0.1], rate: 24, vti: an.vti, arrays: [rgba, opacity], encoding: appended, compression: none}
+  - render: {id: space, occlusion: screen_space, screen_space: {slices: 8, steps: 8, thickness: 1, max_distance: 2}, dimensions: [3, 4, 5], input: s}
+  - write: {id: w4, input: space, vti: d.vti}
+  - shade: {id: sh, image: v.vti, depth: depth, normal: normal, dimension: 4, camera: {field_of_view: 80}, screen_space: {slices: 4}, vti: s.vti}
   - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
 ";
 
@@ -46,6 +50,7 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("PipelineSpec.stages", Err("the stages follow")),
     ("SceneSpec.id", Err("a name for other stages")),
     ("SceneSpec.dimension", Err("changes what everything else may be; see `a_scene_s_dimension_counts`")),
+    ("SceneSpec.twin", Err("adds stages, whose files have keys of their own")),
     ("SceneSpec.objects", Ok("s.objects[0].tesseract.size=0.6")),
     ("OcclusionSpec.id", Err("a name for other stages")),
     ("OcclusionSpec.input", Err("`loaded_values_and_other_scenes_count`")),
@@ -61,12 +66,18 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("RenderSpec.id", Err("a name for other stages")),
     ("RenderSpec.input", Err("`loaded_values_and_other_scenes_count`")),
     ("RenderSpec.occlusion", Ok("r.occlusion=o2")),
+    ("RenderSpec.screen_space", Err("its keys follow")),
+    ("ScreenSpaceSpec.slices", Ok("space.screen_space.slices=9")),
+    ("ScreenSpaceSpec.steps", Ok("space.screen_space.steps=9")),
+    ("ScreenSpaceSpec.thickness", Ok("space.screen_space.thickness=unlimited")),
+    ("ScreenSpaceSpec.max_distance", Ok("space.screen_space.max_distance=3")),
     ("RenderSpec.camera", Err("its keys follow")),
     ("RenderSpec.dimensions", Ok("r.dimensions=[3, 4, 6]")),
     ("RenderSpec.shading", Ok("r.shading=flat")),
     ("RenderSpec.denoise", Ok("parallel.denoise=false")),
     ("RenderSpec.tolerance", Ok("mended.tolerance=0.03")),
     ("RenderSpec.supersample", Ok("parallel.supersample=2")),
+    ("RenderSpec.layers", Ok("parallel.layers=3")),
     ("RenderSpec.dilate", Ok("parallel.dilate=2")),
     ("RenderSpec.lights", Err("its keys follow")),
     ("LightSpec.direction", Ok("parallel.lights[0].direction=[0, -1, 0, 1]")),
@@ -118,6 +129,32 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("WireframeSpec.angle", Ok("wire.angle=21")),
     ("WireframeSpec.near", Ok("wire.near=0.2")),
     ("WireframeSpec.vtp", Err("a file doesn't depend on its name")),
+    ("AnimateSpec.id", Err("a name for other stages")),
+    ("AnimateSpec.input", Ok("an.input=parallel")),
+    ("AnimateSpec.frames", Err("changes which files there are; each frame's key has where the path is")),
+    ("AnimateSpec.moves", Ok("an.moves=eye")),
+    ("AnimateSpec.turn", Err("its keys follow")),
+    ("TurnSpec.plane", Ok("an.turn.plane=yw")),
+    ("TurnSpec.from", Ok("an.turn.from=1")),
+    ("TurnSpec.to", Ok("an.turn.to=91")),
+    ("TurnSpec.center", Ok("an.turn.center=[0, 0, 0, -2]")),
+    ("AnimateSpec.move", Err("its keys follow")),
+    ("MoveSpec.from", Ok("an.move.from=[0, 0, 1, 0]")),
+    ("MoveSpec.to", Ok("an.move.to=[0, 0, 1, 1]")),
+    ("AnimateSpec.scan", Ok("an.scan=[0, 0.2]")),
+    ("AnimateSpec.rate", Ok("an.rate=25")),
+    ("AnimateSpec.vti", Err("a file doesn't depend on its name")),
+    ("AnimateSpec.arrays", Ok("an.arrays=[opacity, rgba]")),
+    ("AnimateSpec.encoding", Ok("an.encoding=inline")),
+    ("AnimateSpec.compression", Ok("an.compression=zlib")),
+    ("ShadeSpec.id", Err("a name for other stages")),
+    ("ShadeSpec.image", Err("`loaded_values_and_other_scenes_count`")),
+    ("ShadeSpec.camera", Ok("sh.camera.field_of_view=81")),
+    ("ShadeSpec.dimension", Err("how many numbers the camera's vectors have")),
+    ("ShadeSpec.depth", Ok("sh.depth=z")),
+    ("ShadeSpec.normal", Ok("sh.normal=n")),
+    ("ShadeSpec.screen_space", Ok("sh.screen_space.slices=5")),
+    ("ShadeSpec.vti", Err("a file doesn't depend on its name")),
     ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.state", Err("a state is held against the file that is there, whole")),
@@ -132,9 +169,10 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
 
 /// The plan of a pipeline in a folder with a file of values.
 fn plan(folder: &Path, text: &str, sets: &[&str]) -> Plan {
-    let values = folder.join("v.f32");
-    if !values.exists() {
-        std::fs::write(values, "").unwrap();
+    for input in ["v.f32", "v.vti"].map(|name| folder.join(name)) {
+        if !input.exists() {
+            std::fs::write(input, "").unwrap();
+        }
     }
     let document = Document::parse(folder.join("p.yaml").to_str().unwrap(), text).unwrap();
     let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
@@ -175,6 +213,9 @@ fn every_key_counts_or_has_a_reason() {
             "LightSpec",
             "DepthCueSpec",
             "SkySpec",
+            "TurnSpec",
+            "MoveSpec",
+            "ScreenSpaceSpec",
         ];
         // Of a new stage nothing is known here yet.
         let kinds = schema["$defs"]["StageSpec"].to_string();
@@ -206,7 +247,8 @@ fn every_key_counts_or_has_a_reason() {
 fn every_object_s_field_counts() {
     let folder = tempfile::tempdir().unwrap();
     let before = keys(folder.path(), PIPELINE, &[]);
-    let all: BTreeSet<String> = before.keys().cloned().collect();
+    // But for an image that is there already.
+    let all: BTreeSet<String> = before.keys().filter(|file| *file != "s.vti").cloned().collect();
     for set in [
         "s.objects[0].name=two",
         "s.objects[0].color=[1, 0, 0.5]",
@@ -216,6 +258,10 @@ fn every_object_s_field_counts() {
     ] {
         assert_eq!(differing(&before, &keys(folder.path(), PIPELINE, &[set])), all, "{set}");
     }
+    // The closed form knows opaque objects only.
+    let opaque = keys(folder.path(), PIPELINE, &["exact.method=sobol"]);
+    let open = keys(folder.path(), PIPELINE, &["exact.method=sobol", "s.objects[0].opacity=0.5"]);
+    assert_eq!(differing(&opaque, &open), all);
     // What faces the eye depends on where the first camera is.
     let moved = differing(&before, &keys(folder.path(), PIPELINE, &["r.camera.eye=[0, 0, 0, 3]"]));
     assert_eq!(moved, all);
@@ -241,8 +287,10 @@ stages:
   - occlusion: {id: t, input: a, target_error: 0.1, max_samples: 100, file: t.f32}
   - render: {id: r, input: a, occlusion: none, dimensions: [2, 2, 2]}
   - write: {raw: r.raw}
+  - shade: {image: v.vti, vti: s.vti}
 ";
     write("v.f32", b"1234");
+    write("v.vti", b"an image");
     let mut before = keys(folder.path(), text, &[]);
     let mut check = |sets: &[&str], file: &str| {
         let after = keys(folder.path(), text, sets);
@@ -255,6 +303,8 @@ stages:
     check(&["t.target_error=0.2"], "t.f32");
     check(&["t.max_samples=101"], "t.f32");
     check(&["r.input=b"], "r.raw");
+    write("v.vti", b"another");
+    check(&[], "s.vti");
     // The file, and what may stand beside it.
     for name in ["v.f32", "v.f32.yaml", "v.error.f32"] {
         write(name, b"4321");

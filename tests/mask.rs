@@ -119,3 +119,34 @@ fn pictures_need_only_what_they_show() {
     assert!(rays(&again) > 0 && rays(&again) < rays(&some));
     assert_eq!(read(0, "b.raw"), read(1, "b.raw"));
 }
+
+/// What is behind the first surface is shaded too, be it seen through the first or kept in layers.
+#[test]
+fn pictures_of_what_is_behind_need_more() {
+    let run = |keys: [&str; 3], occlusion: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let [opacity, layers, arrays] = keys;
+        let text = format!(
+            "name: behind
+stages:
+  - scene:
+      objects:
+        - {{hypersphere: {{radius: 0.5, subdivisions: 4}}{opacity}}}
+        - hypersphere: {{radius: 0.5, subdivisions: 4, center: [0.3, 0.1, 0, -1.1]}}
+  - occlusion: {{id: ao, samples: 16{occlusion}}}
+  - render: {{camera: {{eye: [0, 0, 0, 2], field_of_view: 45}}, dimensions: [9, 8, 7], shading: smooth{layers}}}
+  - write: {{vti: a.vti, arrays: [rgba, opacity{arrays}]}}
+"
+        );
+        let path = folder.path().join("p.yaml");
+        std::fs::write(&path, text).unwrap();
+        let pipeline = Pipeline::load(&path, &[], Some(folder.path().join("out"))).unwrap();
+        pipeline::run(&pipeline, &pipeline::Settings::default(), &Silent).unwrap();
+        folder
+    };
+    for keys in [[", opacity: 0.3", "", ""], ["", ", layers: 4", ", layer_ambient_occlusion, layers"]] {
+        let [some, all] = ["", ", file: ao.f32"].map(|occlusion| run(keys, occlusion));
+        let [some, all] = [&some, &all].map(|folder| folder.path().join("out/a.vti"));
+        assert!(compare(&some, &all, &Tolerance::default()).unwrap().same, "{keys:?}");
+    }
+}

@@ -124,9 +124,36 @@ fn what_is_not_needed_is_not_parsed() {
     for behind in ["; exported by a program\n", "facets: 12\n", "\n\nEOF", "solid \nendsolid\n"] {
         folder.is_cube("behind.stl", ascii_stl(b"", "0 0 1", behind));
     }
+    // A mark that editors put before texts.
+    for (name, text) in
+        [("mark.obj", obj(b"")), ("mark.ply", ply(b"", "", &[])), ("mark.stl", ascii_stl(b"", "0 0 0", ""))]
+    {
+        let text = text.strip_prefix(b"\n").unwrap_or(&text);
+        folder.is_cube(name, [b"\xef\xbb\xbf", text].concat());
+    }
     for behind in [&b""[..], b"\n", b"\0", b"# written by a program, facet by facet"] {
         folder.is_cube("solid.stl", binary_stl(b"solid part 7", behind));
         folder.is_cube("binary.stl", binary_stl(b"", behind));
+    }
+}
+
+#[test]
+fn cells_of_points_that_are_not_there_are_refused() {
+    let folder = Folder::new();
+    let refused = |name: &str, bytes: Vec<u8>, told: &str| {
+        let error = folder.read(name, bytes).unwrap_err().to_string();
+        let info = Info::read(&folder.0.path().join(name)).unwrap_err().to_string();
+        assert!(error.contains(told) && info.contains(told), "{error}\n{info}");
+    };
+    let text = String::from_utf8(ply(b"", "", &[])).unwrap();
+    refused("beyond.ply", text.replace("3 7 5 6\n", "3 7 5 8\n").into(), "cell 11 names point 8 of 8");
+    let text = String::from_utf8(obj(b"")).unwrap();
+    refused("beyond.obj", text.replace("f 8 6 7\n", "f 8 6 9\n").into(), "names vertex 9 of 8");
+    // What is no format for this program is told with the way to one that is.
+    for (name, told) in
+        [("a.vtm", "Merge Blocks"), ("a.step", "gmsh -2"), ("a.off", "Blender"), ("a.inp", "meshio convert")]
+    {
+        refused(name, b"x".to_vec(), told);
     }
 }
 

@@ -146,6 +146,27 @@ fn scenes<const D: usize>() {
     speck.vertices.extend(small.vertices);
     speck.simplices.extend(small.simplices.iter().map(|s| s.map(|v| v + shift)));
     dark("speck", &speck, &sobol);
+    // Something far away, and a floor that reaches as far: what lies together is met as without them.
+    for far in [1e6, 1e12, 1e25] {
+        for floor in [false, true] {
+            let mut scene = soup::<D>(1, 60, 0.6, false);
+            let mut other = soup::<D>(9, 2, 1.0, false);
+            if floor {
+                other = soup::<D>(9, 1, 1.0, false);
+                // To all sides, nearly level, 2 below the middle of the scene.
+                other.vertices.iter_mut().for_each(|v| *v = v.map(|x| x * far));
+                other.vertices.iter_mut().for_each(|v| v[D - 1] = v[D - 1].mul_add(1e-3 / far, -2.0));
+            }
+            let shift = scene.vertices.len() as u32;
+            let by = if floor { 0.0 } else { far };
+            scene.vertices.extend(other.vertices.iter().map(|v| v.add_scalar(by)));
+            scene.simplices.extend(other.simplices.iter().map(|s| s.map(|v| v + shift)));
+            dark(&format!("apart by {far}, floor {floor}"), &scene, &sobol);
+            let tracer = Tracer::new(mesh(&scene));
+            let served = tracer.mesh().vertices.iter().filter(|v| tracer.wide().serves(v)).count();
+            assert!(served >= shift as usize, "{far} {floor}: {served}");
+        }
+    }
 }
 
 #[test]

@@ -98,6 +98,7 @@ fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
         panels: panels.iter().map(panel).collect(),
         source,
         cut: Cut::Octant { corner: None },
+        film: None,
         screenshot: Some("figure.png".into()),
         size: Some([800, 500]),
         style: Style::Voxels,
@@ -478,4 +479,65 @@ fn check_text(path: &Path, caption: &str) {
     assert_eq!(constants["PANELS"][0]["dimensions"], serde_json::json!([20, 20, 20]));
     assert_eq!(constants["CUT"], serde_json::json!(["plane", 1, 1.0 / 3.0]));
     assert_eq!(constants["SIZE"], serde_json::json!([800, 500]));
+}
+
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn an_animation_has_a_picture_a_frame_and_a_film_where_ffmpeg_is() {
+    let folder = scratch();
+    let grid = cube(20);
+    // A red block that goes from the left to the right, and a green one that stays.
+    let frames: Vec<Image> = [3usize, 8, 13]
+        .map(|at| {
+            Image::new(grid, |index| {
+                let block = |at: usize| (at..at + 4).contains(&index[0]) && index[2].abs_diff(10) < 4;
+                match index[1] {
+                    12..16 if block(at) => Some([200, 0, 0]),
+                    4..8 if block(8) => Some([0, 200, 0]),
+                    _ => None,
+                }
+            })
+        })
+        .into();
+    let mut list = Vec::new();
+    for (i, frame) in frames.iter().enumerate() {
+        frame.write_vti(&folder.path().join(format!("a_{i:04}.vti")));
+        list.push((i as f64 / 8.0, format!("a_{i:04}.vti")));
+    }
+    let names = list.iter().map(|(time, name)| (*time, name.as_str()));
+    ao4d::io::pvd::write(fs::File::create(folder.path().join("a.pvd")).unwrap(), names).unwrap();
+    let film = Some(ao4d::io::paraview::Film { frames: 3, rate: 8.0 });
+    let figure = Figure { film, size: Some([301, 280]), ..surface(&[("a.pvd", "", &frames[0])]) };
+    write_state(folder.path(), &figure);
+    // A stand-in for ffmpeg, which notes what it is asked for; and none.
+    let tools = folder.path().join("tools");
+    fs::create_dir(&tools).unwrap();
+    fs::write(tools.join("ffmpeg"), "#!/bin/sh\nfor last; do :; done\necho \"$*\" > \"$last\"\n").unwrap();
+    let path = std::env::var("PATH").unwrap();
+    let headless = Path::new(env!("CARGO_MANIFEST_DIR")).join("paraview/headless");
+    assert!(Command::new("chmod").arg("+x").arg(tools.join("ffmpeg")).status().unwrap().success());
+    let output = Command::new(&headless)
+        .args(["timeout", "300", "pvbatch", "figure.py"])
+        .env("PATH", format!("{}:{path}", tools.display()))
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success() && !err.contains("ERR|") && !err.contains("Traceback"), "{out}\n{err}");
+    let asked = fs::read_to_string(folder.path().join("figure.mp4")).unwrap_or_else(|e| panic!("{e}: {out}\n{err}"));
+    assert!(asked.contains("-framerate 8.0 -i ") && asked.contains("figure_%04d.png -frames:v 3 "), "{asked}");
+    let picture = |name: &str| Picture::read(&folder.path().join(name));
+    let places: Vec<[[f64; 2]; 2]> = (0..3)
+        .map(|i| {
+            let picture = picture(&format!("figure_{i:04}.png"));
+            assert_eq!((picture.width, picture.height), (301, 280));
+            let whole = picture.part([0.0, 1.0], [0.0, 1.0]);
+            [0, 1].map(|channel| centre(&whole, channel))
+        })
+        .collect();
+    // Red moves to the right, by as much each time or nearly; green stays where it is.
+    let red: Vec<f64> = places.iter().map(|place| place[0][0]).collect();
+    assert!(red[1] - red[0] > 0.05 && red[2] - red[1] > 0.05, "{red:?}");
+    assert!(places.iter().all(|place| (place[1][0] - places[0][1][0]).abs() < 0.01), "{places:?}");
+    assert!(picture("figure.png") == picture("figure_0000.png"), "the picture is the first frame");
 }

@@ -82,8 +82,8 @@ fn check(pipeline: &str, with_image: bool) {
     assert!(error("sobol", "65536") < 1e-3);
     assert!(error("as_published", "4096") > 0.3);
     let of = |shading: &str| found.iter().filter(|r| r["kind"] == "image" && r["method"] == shading).count();
-    let shadings = ["flat", "smooth", "voxel", "voxel+denoise", "auto"].map(of);
-    assert_eq!(shadings, if with_image { [4, 4, 4, 4, 3] } else { [0; 5] });
+    let shadings = ["flat", "smooth", "voxel", "voxel+denoise", "auto", "screen_space"].map(of);
+    assert_eq!(shadings, if with_image { [4, 4, 4, 4, 3, 2] } else { [0; 6] });
     if with_image {
         // Rays at each voxel converge to the truth; a filter makes much of few of them.
         let image = |shading: &str, samples: &str| -> f64 {
@@ -103,7 +103,7 @@ fn check(pipeline: &str, with_image: bool) {
     for name in ["as_published", "random", "sobol", "exact"] {
         assert!(texts.contains(&name), "{name}");
     }
-    for name in ["flat", "smooth", "voxel", "voxel+denoise", "auto"] {
+    for name in ["flat", "smooth", "voxel", "voxel+denoise", "auto", "screen_space"] {
         assert_eq!(texts.contains(&name), with_image, "{name}");
     }
     assert!(!svg.contains("NaN") && !svg.contains("inf"));

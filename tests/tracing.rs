@@ -3,18 +3,19 @@
 use std::sync::Arc;
 
 use ao4d::accel::Tracer;
-use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64};
+use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64, normal_of, widen};
 use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
 use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
 use ao4d::render::filters::denoise::Refine;
 use ao4d::render::filters::{Dilate, ImageFilter, denoise};
 use ao4d::render::tone::{to_linear, to_screen};
+use ao4d::render::visibility::Method;
 use ao4d::render::{
-    Accuracy, Aov, Camera, DepthCue, Light, Lighting, Projection, Renderer, Shading, Slab, Source, View,
+    Accuracy, Aov, Camera, DepthCue, Light, Lighting, Projection, Renderer, Shading, Slab, Source, View, Visibility,
 };
 use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
-use ao4d::trace::{NOTHING, RayBackend, Sampling};
+use ao4d::trace::{NOTHING, RayBackend, Sampling, ShadingPoint};
 use ao4d::volume::Values;
 
 mod support;
@@ -470,9 +471,10 @@ fn convex_bodies_throw_no_shadow_onto_themselves() {
 }
 
 /// A picture is the same bytes however thick its slabs are, and on however many threads it is made.
-fn slabs<const D: usize>() {
+fn slabs<const D: usize>(opacity: f32) {
     let mut random = Random(3);
-    let mesh = soup::<D>(&mut random, 30, false);
+    let mut mesh = soup::<D>(&mut random, 30, false);
+    mesh.objects[0].opacity = opacity;
     let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(mesh.clone())));
     let view = View { eye: View::<D>::default().eye * 3.0, ..View::default() };
     let camera = Camera::new(&view).unwrap();
@@ -499,10 +501,11 @@ fn slabs<const D: usize>() {
                 renderer.filters.push(Box::new(Refine::new(Arc::clone(&backend), Sampling::new(64, 1), 0.02)));
                 renderer.filters.push(Box::new(Dilate { layers: 3 }));
             }
+            renderer.layers = 2;
             let whole = renderer.volume(Aov::ALL, &Silent).unwrap().arrays;
             for (thickness, threads) in [(1, 1), (2, 3), (7, 2), (100, 1)] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                let mut bytes: Vec<Vec<u8>> = vec![Vec::new(); Aov::ALL.len()];
+                let mut bytes: Vec<Vec<u8>> = vec![Vec::new(); whole.len()];
                 let add = |slab: Slab| {
                     for (bytes, array) in bytes.iter_mut().zip(&slab.arrays) {
                         array.values.extend_le_bytes(0..array.values.len(), bytes);
@@ -579,8 +582,10 @@ fn supersampled_voxels_are_means_of_what_they_show() {
 
 #[test]
 fn slabs_make_up_the_picture() {
-    slabs::<3>();
-    slabs::<4>();
+    slabs::<3>(1.0);
+    slabs::<4>(1.0);
+    slabs::<3>(0.4);
+    slabs::<4>(0.4);
 }
 
 /// A box over a floor, and what a camera sees of it.
@@ -646,4 +651,262 @@ fn pictures_measure_themselves<const D: usize>() {
 fn pictures_tell_how_far_off_they_are_and_keep_to_a_tolerance() {
     pictures_measure_themselves::<3>();
     pictures_measure_themselves::<4>();
+}
+
+/// A simplex across the last axis, so large that it covers what a camera there sees.
+fn sheet<const D: usize>(at: f64) -> Surface<D> {
+    let corner = |i: usize| {
+        Vector64::from_fn(|r, _| match (r, i) {
+            (r, _) if r == D - 1 => at,
+            (_, i) if i == D - 1 => -30.0,
+            (r, i) => {
+                if r == i {
+                    30.0
+                } else {
+                    0.0
+                }
+            }
+        })
+    };
+    Surface {
+        vertices: (0..D).map(corner).collect(),
+        simplices: vec![std::array::from_fn(|i| i as u32)],
+        normals: None,
+    }
+}
+
+/// A scene of surfaces, each of its own opacity and colour.
+fn objects<const D: usize>(all: &[(&Surface<D>, f32, [f32; 3])]) -> Mesh<D> {
+    let mut builder = MeshBuilder::new();
+    for (i, (surface, opacity, color)) in all.iter().enumerate() {
+        builder.add(&format!("{i}"), *color, surface, Orientation::Input).unwrap();
+        builder.set_opacity(*opacity);
+    }
+    builder.finish()
+}
+
+/// What light passes, against what is known: sums over the same rays.
+fn passing_light<const D: usize>() {
+    let white = [1.0; 3];
+    let mut random = Random(77);
+    let ground = random.soup::<D>(12, 0.5, false);
+    // A wall that each ray passes once at most, and a closed body that it passes twice.
+    let wall = Surface {
+        vertices: (0..D).map(|_| random.point::<D>(false) + Vector64::from_fn(|_, _| 0.4)).collect(),
+        simplices: vec![std::array::from_fn(|i| i as u32)],
+        normals: None,
+    };
+    let corners: Vec<Vector64<D>> =
+        (0..=D).map(|i| Vector64::from_fn(|r, _| if i < D && r == i { 1.1 } else { -0.4 })).collect();
+    let facets = (0..=D).map(|skip| {
+        let mut others = (0..=D as u32).filter(|&v| v as usize != skip);
+        std::array::from_fn(|_| others.next().unwrap())
+    });
+    let body = Surface { vertices: corners, simplices: facets.collect(), normals: None };
+    let sampling = Sampling::new(256, 3);
+    let values = |mesh: Mesh<D>| {
+        let [packets, slow]: [Arc<dyn RayBackend<D>>; 2] = [
+            Arc::new(CpuBackend::new(Tracer::new(mesh.clone()))),
+            Arc::new(ScalarBackend::new(Tracer::new(mesh.clone()))),
+        ];
+        // Points in space, each seeing into another direction, and the vertices.
+        let point = |i: u64| {
+            let mut random = Random(i as u32 + 1);
+            let normal = random.point::<D>(false).normalize().map(|x| x as f32);
+            let position = random.point::<D>(false).map(|x| 1.5 * x as f32);
+            ShadingPoint::Inside { position, normal, simplex: NOTHING, number: i }
+        };
+        let vertices = ShadingPoint::vertices(&mesh);
+        let points: Vec<ShadingPoint<D>> = (0..200).map(point).chain(vertices.into_iter().take(12 * D)).collect();
+        let found = Estimator::Sampled(sampling).estimate(&*packets, &points, None, &Silent).unwrap();
+        let again = Estimator::Adaptive(sampling).estimate(&*slow, &points, None, &Silent).unwrap();
+        assert!(!mesh.is_translucent() || found == again);
+        found
+    };
+    let open = values(objects(&[(&ground, 0.0, white)]));
+    assert!(open.values.iter().all(|&value| value == 1.0));
+    for (occluder, surfaces) in [(&wall, 1), (&body, 2)] {
+        let with = |opacity: f32| values(objects(&[(occluder, opacity, white)]));
+        let (whole, half) = (with(1.0), with(0.5));
+        let mut between = 0;
+        for (&opaque, &half) in whole.values.iter().zip(&half.values).take(200) {
+            // Where a ray starts inside the body it leaves it only.
+            let let_through: &[f32] = if surfaces == 1 { &[0.5] } else { &[0.25, 0.5] };
+            assert!(let_through.iter().any(|&share| half == opaque + share * (1.0 - opaque)), "{D}D: {opaque} {half}");
+            between += usize::from(opaque > 0.0 && opaque < 1.0);
+        }
+        assert!(between > 5, "{D}D: {between}");
+    }
+    // Among others, and for vertices too: 0 is as good as not there, 1 is as it always was, whatever light passes elsewhere.
+    let far = Surface {
+        vertices: sheet::<D>(0.0).vertices.iter().map(|v| v * 1e-3 + Vector64::from_element(9e3)).collect(),
+        ..sheet(0.0)
+    };
+    let alone = values(objects(&[(&ground, 1.0, white)]));
+    let without = values(objects(&[(&ground, 1.0, white), (&body, 0.0, white), (&wall, 0.0, white)]));
+    assert_eq!(alone, without);
+    let all = [(&ground, 1.0, white), (&body, 1.0, white), (&wall, 1.0, white)];
+    let opaque = values(objects(&all));
+    assert!(opaque.values.iter().zip(&alone.values).any(|(a, b)| a < b));
+    let beside = objects(&[all.to_vec(), vec![(&far, 0.5, white)]].concat());
+    assert!(beside.is_translucent());
+    assert_eq!(opaque, values(beside));
+    // The closed form knows nothing of it, and says so.
+    let mesh = objects(&[(&ground, 1.0, white), (&wall, 0.5, white)]);
+    let backend = CpuBackend::new(Tracer::new(mesh.clone()));
+    let exact = Estimator::Exact(Default::default()).estimate(&backend, &ShadingPoint::vertices(&mesh), None, &Silent);
+    assert_eq!(exact, Err(ao4d::occlusion::Error::Translucent));
+}
+
+#[test]
+fn light_passes_objects_in_the_share_they_say() {
+    passing_light::<3>();
+    passing_light::<4>();
+}
+
+/// Three sheets, one behind the other, and nothing behind them.
+fn blended<const D: usize>() {
+    let [near, middle, far] = [0.0, -0.5, -1.0].map(sheet::<D>);
+    let [red, green, blue] = [[0.9, 0.2, 0.1], [0.1, 0.8, 0.3], [0.2, 0.1, 0.7]];
+    let dimensions = if D == 4 { [5, 4, 3] } else { [6, 5, 1] };
+    let camera = Camera::new(&View::default()).unwrap();
+    let picture = |mesh: Mesh<D>, supersample: usize, lighting: Option<Lighting<D>>| {
+        let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(mesh)));
+        let mut renderer = Renderer::new(backend, camera.clone(), dimensions, Shading::None);
+        (renderer.supersample, renderer.lighting, renderer.layers) = (supersample, lighting, 4);
+        let aovs =
+            [Aov::Rgba, Aov::Opacity, Aov::Coverage, Aov::Light, Aov::Rgb, Aov::Depth, Aov::Layers, Aov::LayerDepth];
+        let arrays = renderer.volume(&aovs, &Silent).unwrap().arrays;
+        arrays
+            .into_iter()
+            .map(|array| (array.name, array.values.to_f64()))
+            .collect::<std::collections::BTreeMap<_, _>>()
+    };
+    let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{D}D: {found} {expected}");
+    for (opacities, supersample) in
+        [([0.25, 0.5, 1.0], 1), ([0.25, 0.5, 0.75], 2), ([0.0, 0.5, 0.5], 1), ([1.0, 0.5, 0.5], 3)]
+    {
+        let all = [(&near, opacities[0], red), (&middle, opacities[1], green), (&far, opacities[2], blue)];
+        let [a, b, c] = opacities.map(f64::from);
+        let weights = [a, (1.0 - a) * b, (1.0 - a) * (1.0 - b) * c];
+        let opacity: f64 = weights.iter().sum();
+        let plain = picture(objects(&all), supersample, None);
+        let lit = picture(objects(&all), supersample, Some(Lighting::new(Vec::new(), 1.0)));
+        for n in 0..dimensions.iter().product() {
+            close(plain["opacity"][n], opacity);
+            close(plain["coverage"][n], 1.0);
+            assert_eq!(plain["layers"][n], 3.0);
+            if supersample == 1 {
+                assert_eq!(plain["depth"][n], plain["depth_1"][n]);
+            }
+            let slant = plain["depth_1"][n];
+            for (name, distance) in [("depth_2", 1.5), ("depth_3", 2.0)] {
+                assert!((plain[name][n] - distance * slant).abs() < 1e-5);
+            }
+            assert_eq!(plain["depth_4"][n], f64::INFINITY);
+            for k in 0..3 {
+                let mean = |curve: &dyn Fn(f64) -> f64| {
+                    let colors = [red, green, blue].map(|color| curve(f64::from(color[k])));
+                    colors.iter().zip(weights).map(|(color, weight)| color * weight).sum::<f64>() / opacity
+                };
+                close(plain["rgb"][3 * n + k], mean(&|color| color) * opacity + 1.0 - opacity);
+                assert!((plain["rgba"][4 * n + k] - 255.0 * mean(&|color| color)).abs() < 0.51);
+                close(lit["light"][3 * n + k], mean(&to_linear));
+                close(lit["rgb"][3 * n + k], to_screen(mean(&to_linear)) * opacity + 1.0 - opacity);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_behind_shows_through() {
+    blended::<3>();
+    blended::<4>();
+}
+
+/// A light behind a sheet of 0.75 lights a wall with a quarter of its strength.
+fn thinned_shadow<const D: usize>() {
+    let [wall, between] = [0.0, 0.5].map(sheet::<D>);
+    let camera = Camera::new(&View { eye: View::<D>::default().eye * 0.25, ..View::default() }).unwrap();
+    let dimensions = if D == 4 { [5, 4, 3] } else { [6, 5, 1] };
+    let light = |opacity: f32| {
+        let backend: Arc<dyn RayBackend<D>> =
+            Arc::new(CpuBackend::new(Tracer::new(objects(&[(&wall, 1.0, [1.0; 3]), (&between, opacity, [1.0; 3])]))));
+        let mut renderer = Renderer::new(backend, camera.clone(), dimensions, Shading::None);
+        let down = Source::Directional(-View::<D>::default().eye);
+        renderer.lighting = Some(Lighting::new(vec![Light { source: down, strength: [1.0; 3] }], 0.0));
+        renderer.volume(&[Aov::Light], &Silent).unwrap().arrays[0].values.to_f64()
+    };
+    for (opacity, expected) in [(1.0, 0.0), (0.75, 0.25), (0.0, 1.0)] {
+        assert!(light(opacity).iter().all(|&found| (found - expected).abs() < 1e-6), "{D}D: {:?}", light(opacity));
+    }
+}
+
+#[test]
+fn shadows_of_what_light_passes_are_thin() {
+    thinned_shadow::<3>();
+    thinned_shadow::<4>();
+}
+
+/// The layers of a picture with occlusion by rays: the first has the values of the picture itself.
+fn shaded_layers<const D: usize>() {
+    let mesh = mesh(&Random(12).soup::<D>(if D == 3 { 100 } else { 300 }, 0.9, false));
+    let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(mesh.clone())));
+    let camera = Camera::new(&View { eye: View::<D>::default().eye * 2.0, ..View::default() }).unwrap();
+    let dimensions = if D == 4 { [9, 8, 7] } else { [30, 25, 1] };
+    let estimates = Estimates {
+        values: (0..mesh.vertices.len()).map(|i| (i % 10) as f32 / 10.0).collect(),
+        errors: vec![0.0; mesh.vertices.len()],
+        rays: 0,
+    };
+    let by_rays = Estimator::Sampled(Sampling::new(32, 1));
+    for shading in [Shading::Smooth(Arc::new(estimates)), Shading::Voxel(by_rays)] {
+        let mut renderer = Renderer::new(Arc::clone(&backend), camera.clone(), dimensions, shading.clone());
+        renderer.layers = 2;
+        let volume = renderer.volume(Aov::ALL, &Silent).unwrap();
+        let values = |name: &str| volume.array(name).unwrap_or_else(|| panic!("{name}")).values.to_f64();
+        for name in ["depth", "object", "ambient_occlusion", "normal"] {
+            assert_eq!(values(name), values(&format!("{name}_1")), "{D}D, {shading:?}: {name}");
+        }
+        let counts = values("layers");
+        assert!(counts.iter().any(|&count| count > 2.0));
+        for layer in 1..=2 {
+            let [depth, object, side, occlusion] =
+                ["depth", "object", "side", "ambient_occlusion"].map(|name| values(&format!("{name}_{layer}")));
+            for n in 0..counts.len() {
+                let there = counts[n] >= f64::from(layer);
+                assert_eq!((depth[n].is_finite(), object[n] > 0.0, side[n] != 0.0), (there, there, there));
+                assert!(there || occlusion[n] == 1.0);
+                let before = if layer > 1 { values(&format!("depth_{}", layer - 1))[n] } else { 0.0 };
+                assert!(depth[n] >= before);
+            }
+        }
+        // What a point in a later layer has is what is asked for there.
+        if let Shading::Voxel(estimator) = shading {
+            let (depth, side) = (values("depth_2"), values("ambient_occlusion_2"));
+            let grid = renderer.grid;
+            let passages = Visibility::new(Arc::clone(&backend), &camera, &grid, Method::Auto)
+                .passages(0..dimensions[2], 2, &Silent)
+                .unwrap();
+            let n = (0..counts.len()).find(|&n| passages.of(n).len() == 2 && side[n] < 1.0).unwrap();
+            let (ray, simplex) = (camera.voxel_ray(&grid, grid.index(n)), passages.of(n)[1].simplex);
+            let normal = normal_of(&mesh.corners(simplex).map(|v| widen(&v)));
+            let normal = normal * -normal.dot(&widen(&ray.direction)).signum() / normal.norm();
+            let point = widen(&ray.origin) + widen(&ray.direction) * (depth[n] / widen(&ray.direction).norm());
+            let point = ShadingPoint::Inside {
+                position: point.map(|x| x as f32),
+                normal: normal.map(|x| x as f32),
+                simplex,
+                number: (grid.len() + n) as u64,
+            };
+            let found = estimator.estimate(&*backend, &[point], None, &Silent).unwrap().values[0];
+            assert!((f64::from(found) - side[n]).abs() <= 1.0 / 32.0, "{D}D: {found} {}", side[n]);
+        }
+    }
+}
+
+#[test]
+fn layers_are_shaded_as_the_picture_is() {
+    shaded_layers::<3>();
+    shaded_layers::<4>();
 }

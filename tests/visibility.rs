@@ -1,11 +1,12 @@
 //! Scan conversion against ray casting: the same simplex in every voxel, however little a facet, a sliver or an edge-on
 //! simplex leaves between yes and no; and the same on any number of threads.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
 use ao4d::accel::Tracer;
-use ao4d::geometry::Vector64;
+use ao4d::geometry::{Ray, Vector64, normal_of, widen};
 use ao4d::mesh::{Mesh, MeshBuilder, Orientation, Surface};
 use ao4d::pipeline::Pipeline;
 use ao4d::progress::Silent;
@@ -63,6 +64,18 @@ fn agree<const D: usize>(name: &str, mesh: &Mesh<D>, camera: &Camera<D>, dimensi
     for (n, (a, b)) in cast.iter().zip(&raster).enumerate() {
         assert_eq!(a, b, "{D}D, {name}, voxel {:?}, {camera:?}", grid.index(n));
     }
+    if grid.len() > 4096 {
+        return cast.iter().filter(|&&s| s != NOTHING).count();
+    }
+    let [passed, rastered] = [Method::RayCast, Method::Rasterize].map(|method| {
+        Visibility::new(backend.clone(), camera, &grid, method).passages(0..dimensions[2], usize::MAX, &Silent).unwrap()
+    });
+    for (n, &first) in cast.iter().enumerate() {
+        let at = || format!("{D}D, {name}, voxel {:?}, {camera:?}", grid.index(n));
+        assert_eq!(passed.of(n), rastered.of(n), "{}", at());
+        assert_eq!(passed.of(n).first().map_or(NOTHING, |passage| passage.simplex), first, "{}", at());
+    }
+    assert_eq!(passed, rastered);
     cast.iter().filter(|&&s| s != NOTHING).count()
 }
 
@@ -181,6 +194,152 @@ fn voxel_centres_exactly_on_facets() {
     exactly_on::<4>();
 }
 
+/// How often the rays of an image pass surfaces: how many rays so many times.
+fn times<const D: usize>(
+    mesh: &Mesh<D>,
+    camera: &Camera<D>,
+    dimensions: [usize; 3],
+    outside: bool,
+) -> BTreeMap<usize, usize> {
+    let (backend, grid) = (backend(mesh), camera.grid(dimensions));
+    let passages = Visibility::new(backend.clone(), camera, &grid, Method::Rasterize)
+        .passages(0..dimensions[2], usize::MAX, &Silent)
+        .unwrap();
+    let mut times = BTreeMap::new();
+    for n in 0..passages.voxels() {
+        let (ray, of_voxel) = (camera.voxel_ray(&grid, grid.index(n)), passages.of(n));
+        let inwards: i32 = of_voxel.iter().map(|p| if p.enters { 1 } else { -1 }).sum();
+        // From outside closed bodies are left as often as they are entered.
+        assert!(inwards <= 0 && (inwards == 0 || !outside), "{D}D, {ray:?}: {of_voxel:?}");
+        for pair in of_voxel.windows(2) {
+            let order = backend.tracer().order(&ray, pair[0].simplex, pair[1].simplex);
+            let [a, b] = [pair[0], pair[1]].map(|p| distance(mesh, &ray, p.simplex));
+            assert!(a <= b * (1.0 + 1e-5), "{D}D, {ray:?}: {a} before {b}");
+            assert!(order.is_le() || (a - b).abs() <= 1e-5 * b, "{D}D, {ray:?}: {pair:?}");
+        }
+        *times.entry(of_voxel.len()).or_insert(0) += 1;
+    }
+    times
+}
+
+/// How far away a simplex's hyperplane is along a ray, by plain arithmetic.
+fn distance<const D: usize>(mesh: &Mesh<D>, ray: &Ray<D>, simplex: u32) -> f64 {
+    let corners = mesh.corners(simplex).map(|v| widen(&v));
+    let normal = normal_of(&corners);
+    normal.dot(&(corners[0] - widen(&ray.origin))) / normal.dot(&widen(&ray.direction))
+}
+
+/// Rays through vertices, edges and facets, along faces, and through the places where they meet: a convex body is passed
+/// twice or never from outside, once from inside, and any closed one in and out in turn.
+fn closed_bodies<const D: usize>() {
+    let n = 16;
+    let dimensions = [n, n, if D == 4 { n } else { 1 }];
+    for pieces in [7, 8] {
+        let size = 0.125 * f64::from(pieces);
+        let cuboid = object::<D>(json!({"box": {"min": vec![-size; D], "max": vec![size; D], "subdivisions": pieces}}));
+        // A quarter of it cut away, so that rays graze inner edges too; and a smaller one inside of it.
+        let cut = json!({"from": vec![0.0; D], "to": vec![2.0 * size; D]});
+        let cut = json!({"cut_cube": {"min": vec![-size; D], "max": vec![size; D], "cuts": [cut]}});
+        let (cut, inner) = (object::<D>(cut), moved(&cuboid, 0.5, 0.0));
+        for distance in [1.0, 2.0, 0.25] {
+            for projection in [PERSPECTIVE, Projection::Parallel { height: 4.0 }] {
+                let eye = View::<D>::default().eye * distance;
+                let from = eye.amax();
+                if [size, 0.5 * size].contains(&from) {
+                    continue; // on the surface itself, that one is not seen
+                }
+                let camera = Camera::new(&View { projection, eye, ..View::default() }).unwrap();
+                let convex = times(&mesh(&cuboid), &camera, dimensions, from > size);
+                let perspective = matches!(projection, Projection::Perspective { .. });
+                println!("{D}D, {pieces} pieces from {distance}: {convex:?}");
+                for &count in convex.keys() {
+                    let right = if from > size {
+                        count == 0 || count == 2
+                    } else if perspective {
+                        count == 1
+                    } else {
+                        count <= 2
+                    };
+                    assert!(right, "{D}D, {pieces} pieces from {distance}, {projection:?}: {convex:?}");
+                }
+                for surfaces in [vec![cut.clone()], vec![cuboid.clone(), inner.clone()], vec![cuboid.clone(); 2]] {
+                    let found = times(&several(&surfaces), &camera, dimensions, from > size);
+                    let odd = found.keys().any(|count| count % 2 == 1);
+                    assert!(from < size || !odd, "{D}D, {pieces} pieces from {distance}, {projection:?}: {found:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn closed_bodies_are_entered_and_left() {
+    closed_bodies::<3>();
+    closed_bodies::<4>();
+}
+
+/// All simplices in turn, solved as a linear system each: what a ray passes where it comes near no boundary.
+fn all_in_turn<const D: usize>(mesh: &Mesh<D>, ray: &Ray<D>) -> Option<Vec<(u32, bool)>> {
+    let mut found: Vec<(f64, u32, bool)> = Vec::new();
+    for simplex in 0..mesh.simplices.len() as u32 {
+        let corners = mesh.corners(simplex).map(|v| widen(&v));
+        // origin + t direction = sum of b_i v_i, sum of b_i = 1.
+        let matrix = nalgebra::DMatrix::from_fn(D + 1, D + 1, |r, c| match (r, c) {
+            (r, c) if r == D => f64::from(u8::from(c < D)),
+            (r, c) if c == D => -f64::from(ray.direction[r]),
+            (r, c) => corners[c][r],
+        });
+        let right = nalgebra::DVector::from_fn(D + 1, |r, _| if r == D { 1.0 } else { f64::from(ray.origin[r]) });
+        let Some(solved) = matrix.lu().solve(&right) else { continue };
+        let least = solved.iter().take(D).copied().fold(f64::INFINITY, f64::min);
+        if least.abs() < 1e-9 || solved[D].abs() < 1e-9 {
+            return None;
+        }
+        if least > 0.0 && solved[D] > 0.0 {
+            let enters = normal_of(&corners).dot(&widen(&ray.direction)) < 0.0;
+            found.push((solved[D], simplex, enters));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let apart = found.windows(2).all(|pair| pair[1].0 - pair[0].0 > 1e-9);
+    apart.then(|| found.into_iter().map(|(_, simplex, enters)| (simplex, enters)).collect())
+}
+
+fn as_all_in_turn<const D: usize>() {
+    let (count, size) = if D == 3 { (60, 0.7) } else { (250, 0.9) };
+    let soup = Random(31).soup::<D>(count, size, false);
+    let sphere = object::<D>(json!({"hypersphere": {"radius": 0.6, "subdivisions": 3}}));
+    let mesh = several(&[soup, sphere]);
+    for projection in [PERSPECTIVE, Projection::Parallel { height: 2.5 }] {
+        let eye = View::<D>::default().eye * 1.7;
+        let camera = Camera::new(&View { projection, eye, ..View::default() }).unwrap();
+        let dimensions = if D == 3 { [61, 43, 1] } else { [11, 13, 9] };
+        let grid = camera.grid(dimensions);
+        let visibility = Visibility::new(backend(&mesh), &camera, &grid, Method::Rasterize);
+        let passages = visibility.passages(0..dimensions[2], usize::MAX, &Silent).unwrap();
+        let first = visibility.passages(0..dimensions[2], 2, &Silent).unwrap();
+        let (mut compared, mut most) = (0, 0);
+        for n in 0..passages.voxels() {
+            let found: Vec<(u32, bool)> = passages.of(n).iter().map(|p| (p.simplex, p.enters)).collect();
+            assert_eq!(first.of(n), &passages.of(n)[..found.len().min(2)]);
+            assert_eq!((first.count(n), passages.count(n)), (found.len() as u32, found.len() as u32));
+            if let Some(expected) = all_in_turn(&mesh, &camera.voxel_ray(&grid, grid.index(n))) {
+                assert_eq!(found, expected, "{D}D, voxel {:?}", grid.index(n));
+                compared += 1;
+                most = most.max(found.len());
+            }
+        }
+        println!("{D}D: {compared} of {} voxels, up to {most} surfaces", passages.voxels());
+        assert!(compared * 10 > passages.voxels() * 9 && most > 4);
+    }
+}
+
+#[test]
+fn passages_are_those_of_all_simplices_in_turn() {
+    as_all_in_turn::<3>();
+    as_all_in_turn::<4>();
+}
+
 fn sliced<const D: usize>() {
     let mesh = mesh(&Random(8).soup::<D>(200, 0.4, true));
     let backend = backend(&mesh);
@@ -194,6 +353,16 @@ fn sliced<const D: usize>() {
         let slab = |k: usize| visibility.first_hits(k..grid.dimensions[2].min(k + thick), &Silent).unwrap();
         pool.install(|| layers.flat_map(slab).collect::<Vec<_>>())
     };
+    let passed = |threads: usize, thick: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let layers = (0..grid.dimensions[2]).step_by(thick);
+        let slab = |k: usize| {
+            let passages = visibility.passages(k..grid.dimensions[2].min(k + thick), 4, &Silent).unwrap();
+            (0..passages.voxels()).map(|n| (passages.count(n), passages.of(n).to_vec())).collect::<Vec<_>>()
+        };
+        pool.install(|| layers.flat_map(slab).collect::<Vec<_>>())
+    };
+    assert_eq!(passed(1, grid.dimensions[2]), passed(3, 2));
     let whole = with(1, grid.dimensions[2]);
     assert!(whole.iter().any(|&s| s != NOTHING));
     for (threads, thick) in [(3, 11), (1, 1), (2, 3), (5, 2)] {

@@ -8,7 +8,8 @@
 //!
 //! The sphere of radius 1 is seen from a distance of 3, as in NTracer's scene (16 n^3 tetrahedra; 18 gives 93,312). Times
 //! are the best of some repeats: `wall` by the clock, `cpu` of all threads together, which other work on the
-//! machine disturbs less. Hierarchy and boxes are told apart; both are made once a picture. Below stand rays of ambient
+//! machine disturbs less. Below each way stands what eight layers take, with the number of surfaces in all of them.
+//! Hierarchy and boxes are told apart; both are made once a picture. Below stand rays of ambient
 //! occlusion, 64 at each vertex, in millions a second, and the share that escapes: nearly all, as of NTracer's shadow rays.
 
 use std::sync::Arc;
@@ -96,6 +97,9 @@ fn main() {
                         let (hits, wall, cpu) =
                             time(|| visibility.first_hits(layers(), &Silent).expect("nobody cancels"));
                         row(way, prepare, wall, cpu, hits.iter().filter(|&&s| s != NOTHING).count());
+                        let (passages, wall, cpu) =
+                            time(|| visibility.passages(layers(), 8, &Silent).expect("nobody cancels"));
+                        row("  8 layers", 0.0, wall, cpu, passages.all().len());
                     }
                     let count = mesh.vertices.len();
                     let estimates = Estimates { values: vec![0.5; count], errors: vec![0.0; count], rays: 0 };
@@ -107,6 +111,17 @@ fn main() {
                         let slab = |_| Ok::<(), ao4d::occlusion::Error>(());
                         let (_, wall, cpu) = time(|| renderer.render(&aovs, None, &Silent, slab).expect("a picture"));
                         row(&format!("shaded, {supersample}"), 0.0, wall, cpu, 0);
+                    }
+                    // The nearest alone, with depth and occlusion, and eight layers of them.
+                    let aovs = [Aov::Depth, Aov::Object, Aov::AmbientOcclusion];
+                    let of_layers = [Aov::LayerDepth, Aov::LayerObject, Aov::LayerAmbientOcclusion, Aov::LayerSide];
+                    renderer.supersample = 1;
+                    for (way, layers) in [("nearest", 0), ("8 layers", 8)] {
+                        renderer.layers = layers;
+                        let aovs = if layers == 0 { aovs.to_vec() } else { of_layers.to_vec() };
+                        let slab = |_| Ok::<(), ao4d::occlusion::Error>(());
+                        let (_, wall, cpu) = time(|| renderer.render(&aovs, None, &Silent, slab).expect("a picture"));
+                        row(way, 0.0, wall, cpu, 0);
                     }
                     let sobol = Estimator::Sampled(Sampling::new(64, 1));
                     let points = ShadingPoint::vertices(&mesh);

@@ -1,14 +1,17 @@
-//! Bounding volume hierarchies over the simplices of a mesh, and the two questions asked of them: which simplex does
-//! a ray hit first, and does it hit any.
+//! Bounding volume hierarchies over the simplices of a mesh, and the questions asked of them: which simplex does a ray hit
+//! first, does it hit any, and which surfaces does it pass on its way.
 
+mod apart;
 mod build;
 mod bvh;
 mod node;
 mod overlap;
+mod passages;
 mod tracer;
 mod wide;
 
 pub use bvh::Bvh;
 pub use node::Node;
+pub use passages::{Candidate, Passage, Wanted};
 pub use tracer::{Hit, Tracer};
 pub use wide::{Leaf, Scale, TAG_BITS, WIDTH, WideBvh, WideNode};

@@ -180,11 +180,14 @@ impl<const D: usize> Tracer<D> {
     /// Which of two simplices comes first on a ray that hits both: `Less` if it is `a`. Of those at exactly the same
     /// distance it is the one of the lower index, as for [`Tracer::closest_hit`].
     pub fn order(&self, ray: &Ray<D>, a: u32, b: u32) -> Ordering {
+        self.distances(ray, a, b).then(a.cmp(&b))
+    }
+
+    /// Compares the distances at which a ray hits two simplices, exactly.
+    pub(super) fn distances(&self, ray: &Ray<D>, a: u32, b: u32) -> Ordering {
         let [one, two] = [a, b].map(|s| Cone::of_simplex(&ray.origin, &self.mesh.corners(s)));
         let [t, u] = [&one, &two].map(|cone| cone.crossing(&ray.direction));
-        let order =
-            if (t.t - u.t).abs() > t.error + u.error { t.t.total_cmp(&u.t) } else { self.exact_order(ray, a, &one, b) };
-        order.then(a.cmp(&b))
+        if (t.t - u.t).abs() > t.error + u.error { t.t.total_cmp(&u.t) } else { self.exact_order(ray, a, &one, b) }
     }
 
     /// Compares the distances of two hits exactly, as fractions.

@@ -9,10 +9,14 @@
 //! them far from overflow. Boxes are also moved to the scene's middle, where rounding is relative to its size, and
 //! grown by [`GROWTH`], more than all rounding of the box test together: a ray that meets a simplex is never told to
 //! miss a box around it, however the test is evaluated.
+//!
+//! Beside something that lies a million sizes away, or is as large, such boxes would hold little but what is beside them. Then
+//! the scene is taken apart ([`super::apart`]): these nodes and leaves hold what lies together, in coordinates of its own,
+//! and a binary tree holds the rest.
 
 use rayon::prelude::*;
 
-use super::Bvh;
+use super::{Bvh, apart};
 use crate::geometry::{Aabb, Vector, Vector64, widen};
 use crate::mesh::Mesh;
 
@@ -73,7 +77,11 @@ pub struct Scale<const D: usize> {
 impl<const D: usize> Scale<D> {
     /// Of the scene with these vertices.
     pub fn of(vertices: &[Vector<D>]) -> Self {
-        let bounds = Aabb::of(vertices);
+        Self::around(&Aabb::of(vertices))
+    }
+
+    /// Of what lies within the box.
+    pub fn around(bounds: &Aabb<D>) -> Self {
         if bounds.is_empty() {
             return Self { centre: Vector64::zeros(), factor: 1.0 };
         }
@@ -108,8 +116,12 @@ pub struct WideBvh<const D: usize> {
     pub depth: usize,
     /// The number of simplices of the mesh.
     total: usize,
-    /// Whether most boxes are larger than what they grow by. They aren't where something lies a million sizes away.
+    /// Whether most boxes are larger than what they grow by.
     fine: bool,
+    /// What lies apart, and is in none of the nodes and leaves.
+    pub far: Bvh<D>,
+    /// Whether the coordinates are those of a part of the scene.
+    of_part: bool,
 }
 
 /// What becomes of the nodes of the binary tree.
@@ -147,13 +159,28 @@ impl Plan {
 impl<const D: usize> WideBvh<D> {
     /// Makes it from the binary tree over simplices of the mesh; if `parallel` on all threads, which changes nothing else.
     pub fn new(bvh: &Bvh<D>, mesh: &Mesh<D>, parallel: bool) -> Self {
+        let whole = Self::over(bvh, mesh, Scale::of(&mesh.vertices), parallel);
+        if whole.fine {
+            return whole;
+        }
+        let bounds = |simplex| Aabb::of(&mesh.corners(simplex));
+        let Some((near, far)) = apart::parts(&bvh.order, bounds, COARSE * GROWTH) else { return whole };
+        let near = Bvh::build(&near, bounds, parallel);
+        let scale = Scale::around(&near.nodes[0].bounds);
+        Self { far: Bvh::build(&far, bounds, parallel), of_part: true, ..Self::over(&near, mesh, scale, parallel) }
+    }
+
+    /// Of what is in the binary tree, in coordinates of this scale.
+    fn over(bvh: &Bvh<D>, mesh: &Mesh<D>, scale: Scale<D>, parallel: bool) -> Self {
         let mut wide = Self {
             nodes: Vec::new(),
             leaves: Vec::new(),
-            scale: Scale::of(&mesh.vertices),
+            scale,
             depth: 0,
             total: mesh.simplices.len(),
             fine: true,
+            far: Bvh::default(),
+            of_part: false,
         };
         if bvh.nodes.is_empty() {
             return wide;
@@ -193,12 +220,21 @@ impl<const D: usize> WideBvh<D> {
     }
 
     /// Whether there are few enough nodes and leaves for references to them, boxes that hold little but what is in them, and
-    /// the point is near enough to the scene for its box tests. If not, ask the binary tree, whose boxes don't grow.
+    /// the point is near enough to them for box tests. If not, ask the binary tree of all, whose boxes don't grow.
     pub fn serves(&self, point: &Vector<D>) -> bool {
         self.fine
             && self.nodes.len().max(self.leaves.len()) < 1 << (32 - TAG_BITS)
             && self.total < 1 << 31
-            && self.scale.centred(point).amax() <= 1.0
+            && self.is_near(point)
+    }
+
+    /// Whether these simplices, too, lie where the coordinates of the leaves are made for.
+    pub fn holds(&self, simplices: &[u32], mesh: &Mesh<D>) -> bool {
+        !self.of_part || simplices.iter().all(|&s| mesh.corners(s).iter().all(|v| self.is_near(v)))
+    }
+
+    fn is_near(&self, point: &Vector<D>) -> bool {
+        self.scale.centred(point).amax() <= 1.0
     }
 
     /// The nodes of the binary tree that become the children of what `source` becomes, smallest box first.

@@ -134,6 +134,42 @@ impl<const D: usize> Cone<D> {
         if signs.contains(&0) { None } else { Some(signs.iter().all(|&s| s > 0)) }
     }
 
+    /// Whether the interior of the cone holds a direction infinitesimally beside one that the cone holds: moved towards the
+    /// inside of the simplex that these columns, from the same origin, lead to, and by ever smaller steps along the axes
+    /// where that still leaves it in the boundary. So of several cones that share a facet just those on one side hold it,
+    /// whichever facet it is.
+    pub fn contains_beside(&self, direction: &Vector<D>, towards: &[Column<D>; D]) -> bool {
+        let wide = widen(direction);
+        let norm1 = wide.iter().map(|x| x.abs()).sum::<f64>();
+        (0..D).all(|i| {
+            let sign = self.facet_sign(i, direction, &wide, norm1);
+            let sign = if sign == 0 { self.sign_beside(i, towards) } else { sign };
+            sign * self.orientation > 0
+        })
+    }
+
+    /// The sign of a facet's determinant for the first of these steps that leaves the facet's hyperplane: the sum of the
+    /// columns, then the axes. It is zero only if the facet is flat, and the cone with it.
+    #[cold]
+    fn sign_beside(&self, i: usize, towards: &[Column<D>; D]) -> i32 {
+        let edges = towards.each_ref().map(|c| widen(&c.head) - widen(&c.tail));
+        let sum = edges.iter().fold(Vector64::zeros(), |sum, edge| sum + edge);
+        let lengths: f64 = edges.iter().flatten().map(|x| x.abs()).sum();
+        let value = self.normals[i].dot(&sum);
+        // Twice: for the rounding of the sum itself.
+        if value.abs() > 2.0 * self.bounds[i] * lengths {
+            return if value > 0.0 { 1 } else { -1 };
+        }
+        let exact = towards.iter().fold(Expansion::default(), |sum, column| {
+            let mut columns = self.columns;
+            columns[i] = *column;
+            sum.add(&exact_determinant(&columns))
+        });
+        let axis = |a: usize| Vector::from_fn(|r, _| if r == a { 1.0 } else { 0.0 });
+        let along_axes = (0..D).map(|a| determinant_sign(&self.replaced(i, &axis(a))));
+        std::iter::once(exact.sign()).chain(along_axes).find(|&sign| sign != 0).unwrap_or(0)
+    }
+
     /// Distance and barycentric coordinates of the point where a direction within the cone meets its base, the
     /// simplex whose vertices are the heads of the columns.
     #[inline]
@@ -202,6 +238,32 @@ mod tests {
         let cone = Cone::of_simplex(&(axis::<D>(0) * 2.0 - axis(1)), &simplex);
         assert_eq!(cone.orientation(), 0);
         assert!(!cone.contains(&(axis::<D>(1) - axis(0))));
+    }
+
+    /// The faces of the cross-polytope of R^D seen from its middle: a direction in many boundaries is beside them in one cone.
+    fn one_cone_holds_what_is_beside<const D: usize>() {
+        let corners = |n: usize| std::array::from_fn(|i| if n >> i & 1 == 0 { axis::<D>(i) } else { -axis::<D>(i) });
+        for n in 0..3usize.pow(D as u32) {
+            let direction = Vector::<D>::from_fn(|r, _| (n / 3usize.pow(r as u32) % 3) as f32 - 1.0);
+            if direction.amax() == 0.0 {
+                continue;
+            }
+            for seen in 0..1 << D {
+                let towards = corners(seen).map(|v| Column::edge(v, Vector::zeros()));
+                let cone = |n: usize| Cone::of_simplex(&Vector::zeros(), &corners(n));
+                let holding: Vec<usize> = (0..1 << D).filter(|&n| cone(n).contains(&direction)).collect();
+                let beside = holding.iter().filter(|&&n| cone(n).contains_beside(&direction, &towards));
+                let beside: Vec<usize> = beside.copied().collect();
+                assert_eq!(beside.len(), 1, "{D}D, {direction:?}, {holding:?}");
+                assert!(!holding.contains(&seen) || beside[0] == seen);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_beside_a_boundary_is_in_one_cone() {
+        one_cone_holds_what_is_beside::<3>();
+        one_cone_holds_what_is_beside::<4>();
     }
 
     #[test]

@@ -74,7 +74,12 @@ impl Contents {
                 DataSet::Image(image) => Self::Image(image),
                 DataSet::Unstructured(mesh) => Self::Mesh(mesh),
             }),
-            _ => Err(Error::Unknown { path: path.into() }),
+            other => Err(match crate::io::mesh::remedy(other) {
+                Some(remedy) => {
+                    Error::Mesh { path: path.into(), message: format!("unsupported: .{other} files; {remedy}") }
+                }
+                None => Error::Unknown { path: path.into() },
+            }),
         }
     }
 

@@ -38,6 +38,8 @@ pub struct Figure {
     pub cut: Cut,
     /// The picture that is written when the state is run by `pvbatch` or `pvpython`, relative to the state's folder.
     pub screenshot: Option<String>,
+    /// If panels are animations, whose files are `.pvd`: what they have in common.
+    pub film: Option<Film>,
     /// Width and height of the picture in pixels; by default what the panels need, 3,200 across all of them with
     /// [`Style::Surface`], 800 across each with [`Style::Voxels`].
     pub size: Option<[u32; 2]>,
@@ -47,6 +49,15 @@ pub struct Figure {
     pub color_by: ColorBy,
     /// Whether a colour bar of ambient occlusion stands in the last panel.
     pub colorbar: bool,
+}
+
+/// How long animations are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Film {
+    /// How many frames there are.
+    pub frames: usize,
+    /// How many of them a second.
+    pub rate: f64,
 }
 
 /// How volumes are drawn. Images of one layer are shown pixel by pixel either way.
@@ -159,6 +170,8 @@ fn constant(figure: &Figure, name: &str) -> String {
             Cut::Plane { axis, at } => format!("('plane', {}, {})", axis as usize, number(at)),
         },
         "SCREENSHOT" => figure.screenshot.as_deref().map_or("None".into(), quoted),
+        "FRAMES" => figure.film.map_or("None".into(), |film| film.frames.to_string()),
+        "RATE" => figure.film.map_or("None".into(), |film| number(film.rate)),
         "LOOK" => match figure.style {
             Style::Surface => SURFACE.into(),
             Style::Voxels => VOXELS.into(),
@@ -231,6 +244,7 @@ mod tests {
             source: Source::Vti,
             cut: Cut::None,
             screenshot: Some("figure.png".into()),
+            film: None,
             size: None,
             style: Style::Surface,
             color_by: ColorBy::Rgba,
@@ -255,11 +269,16 @@ mod tests {
         assert_eq!(line(&text, "CUT"), "CUT = None");
         assert_eq!(line(&text, "SCREENSHOT"), "SCREENSHOT = 'figure.png'");
         assert_eq!(line(&text, "SIZE"), "SIZE = None");
+        assert_eq!((line(&text, "FRAMES"), line(&text, "RATE")), ("FRAMES = None".into(), "RATE = None".into()));
         assert_eq!(line(&text, "COLOR_BY"), "COLOR_BY = 'rgba'");
         assert_eq!(line(&text, "COLORBAR"), "COLORBAR = False");
         // The cut is a clip of ParaView's, and the other look isn't there.
         assert!(text.contains("Clip(registrationName") && !text.contains("RELIEF"));
 
+        figure.film = Some(Film { frames: 72, rate: 24.0 });
+        let text = state(&figure);
+        assert_eq!((line(&text, "FRAMES"), line(&text, "RATE")), ("FRAMES = 72".into(), "RATE = 24.0".into()));
+        figure.film = None;
         figure.source = Source::Raw;
         figure.cut = Cut::Plane { axis: Axis::Z, at: 0.25 };
         figure.screenshot = None;

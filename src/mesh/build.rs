@@ -85,6 +85,7 @@ impl<const D: usize> MeshBuilder<D> {
         self.mesh.objects.push(Object {
             name: object(),
             color,
+            opacity: 1.0,
             vertices: first_vertex..self.mesh.vertices.len(),
             simplices: first_simplex..self.mesh.simplices.len(),
             components: 0,
@@ -93,6 +94,13 @@ impl<const D: usize> MeshBuilder<D> {
         let normals = surface.normals.as_ref().map(|n| n.iter().map(normals::unit_if_not).collect());
         self.added.push(Added { open, crease, normals });
         Ok(())
+    }
+
+    /// Lets light pass through the object that was added last: each of its surfaces keeps this share of it, 0 to 1.
+    pub fn set_opacity(&mut self, opacity: f32) {
+        if let Some(object) = self.mesh.objects.last_mut() {
+            object.opacity = opacity;
+        }
     }
 
     /// The finished mesh.

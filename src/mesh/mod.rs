@@ -58,6 +58,8 @@ pub struct Object {
     pub name: String,
     /// Linear RGB, each 0 to 1.
     pub color: [f32; 3],
+    /// The share of light that each of its surfaces keeps from passing, 0 to 1.
+    pub opacity: f32,
     /// Its vertices.
     pub vertices: Range<usize>,
     /// Its simplices.
@@ -115,12 +117,18 @@ impl<const D: usize> Mesh<D> {
         self.objects.partition_point(|o| o.simplices.end <= simplex as usize)
     }
 
+    /// Whether light passes through any object.
+    pub fn is_translucent(&self) -> bool {
+        self.objects.iter().any(|object| object.opacity < 1.0)
+    }
+
     /// The box around all vertices that a simplex uses.
     pub fn bounds(&self) -> Aabb<D> {
         Aabb::of(self.simplices.iter().flatten().map(|&v| &self.vertices[v as usize]))
     }
 
-    /// SHA-256 over everything that decides a value at a vertex: points, normals and simplices. Hexadecimal.
+    /// SHA-256 over everything that decides a value at a vertex: points, normals and simplices, and what light passes
+    /// through. Hexadecimal.
     pub fn content_hash(&self) -> String {
         let mut hash = Sha256::new();
         hash.update([D as u8]);
@@ -128,6 +136,12 @@ impl<const D: usize> Mesh<D> {
             hash_words(&mut hash, points.len(), points.iter().flatten().map(|x| x.to_le_bytes()));
         }
         hash_words(&mut hash, self.simplices.len(), self.simplices.iter().flatten().map(|i| i.to_le_bytes()));
+        if self.is_translucent() {
+            for object in &self.objects {
+                hash.update((object.simplices.end as u64).to_le_bytes());
+                hash.update(object.opacity.to_le_bytes());
+            }
+        }
         hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
     }
 }

@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use super::facets::{has_double, sorted_facets};
 use super::{Copies, Mesh, nesting};
-use crate::geometry::{Aabb, Cone, Vector, Vector64, determinant, normal_of, plane_side, widen};
+use crate::geometry::{Aabb, Column, Cone, Vector, Vector64, determinant, plane_side, widen};
 
 /// How the components of an object are oriented.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,11 +42,18 @@ pub enum Viewpoint<const D: usize> {
 }
 
 impl<const D: usize> Viewpoint<D> {
-    /// Whether a simplex is seen from behind.
+    /// Whether a simplex is seen from behind, exactly.
     pub fn is_behind(&self, corners: &[Vector<D>; D]) -> bool {
         match self {
             Self::Eye(eye) => plane_side(corners, eye) < 0,
-            Self::Parallel { direction, .. } => normal_of(&corners.map(|c| widen(&c))).dot(&widen(direction)) < 0.0,
+            Self::Parallel { direction, .. } => {
+                // det[direction, edges] = normal . direction.
+                let column = |i: usize| match i {
+                    0 => Column::vector(*direction),
+                    i => Column::edge(corners[i], corners[0]),
+                };
+                Cone::new(std::array::from_fn(column)).orientation() < 0
+            }
         }
     }
 

@@ -20,6 +20,9 @@ pub enum Error {
         /// How rich its view is.
         source: OverBudget,
     },
+    /// The method knows opaque objects only.
+    #[error("only rays know of objects that let light through; take the method `sobol`, or make all objects opaque")]
+    Translucent,
     /// OpenCL fails.
     #[error(transparent)]
     OpenCl(#[from] opencl::Error),

@@ -2,7 +2,7 @@
 //!
 //! - Rays, a fixed number or until a target is met ([`Estimator::Sampled`]);
 //! - the closed form ([`Estimator::Exact`]);
-//! - the closed form where the view is simple, rays where it isn't ([`Estimator::Adaptive`]). Which of the two is decided
+//! - the closed form where the view is simple and all is opaque, rays where it isn't ([`Estimator::Adaptive`]). Which of the two is decided
 //!   by the scene alone, never by a ray, so the values have no bias. Where few simplices are to be seen there is the most
 //!   to gain, as their silhouettes are long for what they cover, and points sent elsewhere say little about them;
 //! - the algorithm as it was published ([`Estimator::AsPublished`]), whose errors are those of its rays, not of its
@@ -34,7 +34,7 @@ const BATCH: usize = 4;
 pub enum Estimator {
     /// By rays.
     Sampled(Sampling),
-    /// In closed form where that is cheap, else by rays; always by rays if distances are limited.
+    /// In closed form where that is cheap, else by rays; always by rays if distances are limited, or light passes objects.
     Adaptive(Sampling),
     /// In closed form.
     Exact(Budget),
@@ -75,7 +75,8 @@ impl Estimator {
     ///
     /// # Errors
     /// [`Error::Cancelled`] if `progress` says so, soon, be it in the middle of a point; [`Error::OverBudget`] if the
-    /// closed form is too expensive at some point; [`Error::OpenCl`] if a device fails.
+    /// closed form is too expensive at some point; [`Error::Translucent`] if objects let light through and the method knows
+    /// opaque ones only; [`Error::OpenCl`] if a device fails.
     ///
     /// # Panics
     /// If the mask has another length than the points.
@@ -90,6 +91,9 @@ impl Estimator {
             mask.is_none_or(|mask| mask.len() == points.len()),
             "a mask says of each point whether it is asked for"
         );
+        if backend.tracer().mesh().is_translucent() && !matches!(self, Self::Sampled(_) | Self::Adaptive(_)) {
+            return Err(Error::Translucent);
+        }
         backend.tracer().prepare();
         let order = spatial_order(backend.tracer(), points, mask);
         let asked: Vec<ShadingPoint<D>> = order.iter().map(|&i| points[i]).collect();
@@ -157,7 +161,7 @@ fn adaptive<const D: usize>(
     sampling: &Sampling,
     progress: &dyn Progress,
 ) -> Result<Vec<Estimate>, Error> {
-    if sampling.max_distance != f32::INFINITY {
+    if sampling.max_distance != f32::INFINITY || backend.tracer().mesh().is_translucent() {
         return Ok(backend.open_fractions(points, sampling, progress)?);
     }
     let closed = |point: &ShadingPoint<D>| {

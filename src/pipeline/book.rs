@@ -70,13 +70,19 @@ impl Book {
         outputs.any(|output| self.stale.contains(&output.file))
     }
 
+    /// Whether any file of a stage has to be made.
+    pub fn needs_stage(&self, stage: usize) -> bool {
+        self.outputs[stage].iter().any(|output| self.stale.contains(&output.file))
+    }
+
     /// From here on files are made of this scene, of which this is to be told.
     pub fn begin_scene(&mut self, notes: Vec<String>) {
         self.tell(&notes);
         self.scene_notes = notes;
     }
 
-    fn tell(&mut self, notes: &[String]) {
+    /// Tells this of the run, unless it was told before.
+    pub fn tell(&mut self, notes: &[String]) {
         for note in notes {
             if !self.report.notes.contains(note) {
                 self.report.notes.push(note.clone());
@@ -127,15 +133,19 @@ impl Ledger for Book {
 /// Takes away what a run left half-written that was killed. The folder is locked, so nobody else is writing these.
 fn sweep(plan: &Plan) {
     let own = (0..plan.stages.len()).flat_map(|stage| plan.all_files_of(stage));
+    let mut names: BTreeMap<PathBuf, BTreeSet<String>> = BTreeMap::new();
     for file in own.chain([PathBuf::from(cache::NAME)]) {
         let path = plan.out.join(file);
         let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { continue };
-        let prefix = format!(".{}.", name.to_string_lossy());
+        names.entry(folder.to_owned()).or_default().insert(name.to_string_lossy().into_owned());
+    }
+    for (folder, names) in names {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let found = entry.file_name().to_string_lossy().into_owned();
-            // A random part without a dot, so that `.a.vti.x.partial` is not taken for one of `a`.
-            let random = found.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".partial"));
-            if random.is_some_and(|random| !random.contains('.')) && entry.file_type().is_ok_and(|t| t.is_file()) {
+            let inner = found.strip_prefix('.').and_then(|rest| rest.strip_suffix(".partial"));
+            // The random part is behind the last dot, so that `.a.vti.x.partial` is not taken for one of `a`.
+            let own = inner.and_then(|inner| inner.rsplit_once('.')).is_some_and(|(name, _)| names.contains(name));
+            if own && entry.file_type().is_ok_and(|t| t.is_file()) {
                 let _ = std::fs::remove_file(entry.path());
             }
         }

@@ -21,7 +21,9 @@ pub(super) fn text(pipeline: &Pipeline, keys: &Keys) -> String {
     let plan = &pipeline.plan;
     let mut stages = pipeline.document.root().get("stages").cloned().unwrap_or_else(|| node(Value::List(Vec::new())));
     if let Value::List(list) = &mut stages.value {
-        for (index, stage) in list.iter_mut().enumerate() {
+        // Twins are not written.
+        let written = (0..plan.stages.len()).filter(|&index| !plan.is_twin(index));
+        for (index, stage) in written.zip(list.iter_mut()) {
             // A stage is a mapping of its kind to its keys.
             if let Value::Map(entries) = &mut stage.value {
                 entries.iter_mut().for_each(|entry| fill(&mut entry.value, &plan.written(index)));
@@ -149,6 +151,7 @@ stages:
   - render: {id: few, occlusion: t, input: t, dimensions: [4, 4, 4], shading: auto}
   - render: {id: flat, occlusion: a, dimensions: [4, 4, 4], shading: flat}
   - render: {id: none, occlusion: none, dimensions: [4, 4, 4]}
+  - render: {id: space, occlusion: screen_space, dimensions: [4, 4, 4]}
   - write: {vti: a.vti}
   - write: {input: few, png: a.png}
   - mesh: {vtu: mesh.vtu}

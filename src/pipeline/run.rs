@@ -25,7 +25,7 @@ use crate::stages::describe::grouped;
 use crate::stages::occlusion::OcclusionPlan;
 use crate::stages::prepare::{Loaded, Prepared};
 use crate::stages::scene::{AnyMesh, ScenePlan};
-use crate::stages::{Keys, Ledger, Ref, Run, SceneRun, StageError};
+use crate::stages::{Keys, Ledger, Needs, Ref, Run, SceneRun, StageError};
 use crate::trace::opencl::OpenCl;
 use crate::volume::available_memory;
 
@@ -43,11 +43,13 @@ pub enum RunError {
     Stage(StageError),
     /// A picture doesn't fit in memory.
     #[error(
-        "render {render}: one layer of its picture takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays"
+        "{stage}: {holds} takes {needed} bytes of memory, and {available} are free; lower its dimensions, or write fewer arrays or layers"
     )]
     Memory {
-        /// The picture.
-        render: String,
+        /// The stage, by its kind and id.
+        stage: String,
+        /// What needs them.
+        holds: &'static str,
         /// Bytes that are needed at once.
         needed: u64,
         /// Bytes that are there.
@@ -95,7 +97,10 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     let mut book = Book::open(plan, &keys, made_by, settings.force);
     check_resources(pipeline, &book)?;
     let running = progress.stage("scene", 0);
-    let wanted = |stage| plan.scene_of(stage).is_some_and(|scene| book.needs(plan, scene));
+    let wanted = |stage| match plan.scene_of(stage) {
+        Some(scene) => book.needs(plan, scene),
+        None => book.needs_stage(stage),
+    };
     let prepared = pipeline.prepare_watched(wanted, progress);
     running.end();
     if progress.cancelled() {
@@ -147,11 +152,12 @@ fn check_resources(pipeline: &Pipeline, book: &Book) -> Result<(), RunError> {
     let plan = &pipeline.plan;
     let needs = (0..plan.stages.len()).map(|stage| (plan.needs(stage, &|file| book.is_stale(file)), stage));
     let needs: Vec<_> = needs.collect();
-    let most = needs.iter().map(|(needs, stage)| (needs.memory, *stage)).max();
-    if let (Some((needed, stage)), Some(available)) = (most, available_memory())
-        && needed > available
+    let most = needs.iter().max_by_key(|(needs, stage)| (needs.memory, *stage));
+    if let (Some((Needs { memory, holds, .. }, stage)), Some(available)) = (most, available_memory())
+        && *memory > available
     {
-        return Err(RunError::Memory { render: plan.stages[stage].id.clone(), needed, available });
+        let name = format!("{} {}", plan.kind(*stage), plan.stages[*stage].id);
+        return Err(RunError::Memory { stage: name, holds, needed: *memory, available });
     }
     let disk = needs.iter().fold(0, |sum: u64, (needs, _)| sum.saturating_add(needs.disk));
     Ok(io::check_free_space(&plan.out, disk)?)
@@ -183,6 +189,13 @@ impl Schedule<'_> {
         let detail = format!("{} vertices, {} simplices", grouped(vertices), grouped(simplices));
         self.times.insert(scene.index(), (building, detail));
         self.book.begin_scene(notes);
+        let is_shaded = plan.all::<OcclusionPlan>().any(|(_, occlusion)| occlusion.scene == scene);
+        if self.opencl.is_some() && mesh.is_translucent() && is_shaded {
+            let id = plan.id(scene);
+            self.book.tell(&[format!(
+                "scene {id}: light passes some objects, so its ambient occlusion is computed by the processor, not by OpenCL"
+            )]);
+        }
         let session = match &self.opencl {
             Some(opencl) => Session::on(mesh, Arc::clone(opencl)),
             None => Session::new(mesh),
@@ -203,6 +216,7 @@ impl Schedule<'_> {
         let plan = &self.pipeline.plan;
         for stage in (0..plan.stages.len()).filter(|&stage| plan.scene_of(stage).is_none()) {
             self.stage(stage, |run| plan.run_last(stage, run))?;
+            self.book.tell_unchanged(plan, stage);
         }
         Ok(())
     }

@@ -22,6 +22,7 @@ mod tests {
     use crate::render::Aov;
     use crate::scene::ObjectSpec;
     use crate::stages::StageSpec;
+    use crate::stages::animate::{AnimateSpec, MoveSpec, TurnSpec};
     use crate::stages::camera::{CameraSpec, Projection};
     use crate::stages::cut::{Axis, Plane};
     use crate::stages::mesh::MeshSpec;
@@ -29,6 +30,8 @@ mod tests {
     use crate::stages::paraview::{ColorBy, ParaviewSpec, Reader, Style};
     use crate::stages::render::{RenderSpec, Shading};
     use crate::stages::scene::SceneSpec;
+    use crate::stages::screen_space::ScreenSpaceSpec;
+    use crate::stages::shade::ShadeSpec;
     use crate::stages::write::{Compression, Encoding, WriteSpec};
 
     /// The words that the decoder proposes where it meets one that nobody would use.
@@ -72,7 +75,12 @@ mod tests {
             ("RenderSpec", decoder_knows::<RenderSpec>("{zzz: 1}")),
             ("CameraSpec", decoder_knows::<CameraSpec>("{zzz: 1}")),
             ("WriteSpec", decoder_knows::<WriteSpec>("{zzz: 1}")),
+            ("AnimateSpec", decoder_knows::<AnimateSpec>("{zzz: 1}")),
+            ("TurnSpec", decoder_knows::<TurnSpec>("{zzz: 1}")),
+            ("MoveSpec", decoder_knows::<MoveSpec>("{zzz: 1}")),
             ("MeshSpec", decoder_knows::<MeshSpec>("{zzz: 1}")),
+            ("ScreenSpaceSpec", decoder_knows::<ScreenSpaceSpec>("{zzz: 1}")),
+            ("ShadeSpec", decoder_knows::<ShadeSpec>("{zzz: 1}")),
             ("InputSpec", decoder_knows::<InputSpec>("{zzz: 1}")),
             ("ParaviewSpec", decoder_knows::<ParaviewSpec>("{zzz: 1}")),
             ("Plane", decoder_knows::<Plane>("{zzz: 1}")),

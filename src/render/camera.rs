@@ -238,6 +238,20 @@ impl<const D: usize> Camera<D> {
         self.projection
     }
 
+    /// Where it stands.
+    pub(super) fn eye(&self) -> &Vector64<D> {
+        &self.eye
+    }
+
+    /// A direction by its parts along the axes of the camera's frame: right, up, over (in 4D), back.
+    pub(super) fn to_frame(&self, direction: &Vector64<D>) -> Vector64<D> {
+        let axes = match Dimension::of::<D>() {
+            Dimension::Three => [&self.right, &self.up, &self.back, &self.back],
+            Dimension::Four => [&self.right, &self.up, &self.over, &self.back],
+        };
+        Vector64::from_fn(|r, _| axes[r].dot(direction))
+    }
+
     /// Whether rays are parallel.
     pub(super) fn is_parallel(&self) -> bool {
         matches!(self.projection, Projection::Parallel { .. })

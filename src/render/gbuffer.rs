@@ -49,6 +49,7 @@ macro_rules! columns {
         }
 
         /// One row of voxels of a G-buffer, to be filled. A column that was not asked for is empty.
+        #[allow(dead_code, reason = "some columns are filled otherwise")]
         pub(super) struct RowMut<'g, const D: usize> {
             $(pub $field: &'g mut [$type],)+
         }
@@ -118,6 +119,11 @@ columns! {
     /// What else it sends to the eye, linear RGB: the light of lights, and of depth cues. Only lit pictures have it; black
     /// where nothing is.
     direct DIRECT: [f32; 3] = [0.0; 3];
+    /// What objects behind send through the first, as shown or, where lights are, as linear light. Only scenes with objects that let
+    /// light through have it, and there albedo and direct are what the first surface keeps; black where nothing is.
+    behind BEHIND: [f32; 3] = [0.0; 3];
+    /// The share of the light from behind all that is seen which passes it; 0 where nothing is.
+    through THROUGH: f32 = 0.0;
     /// Ambient occlusion, 1 is open; 1 where nothing is.
     occlusion OCCLUSION: f32 = 1.0;
     /// Ambient occlusion interpolated between the simplex's vertices, where the occlusion itself is found otherwise; 1
@@ -141,6 +147,8 @@ columns! {
     irradiance IRRADIANCE: [f32; 3] = [1.0; 3];
     /// The part of the voxel that sees something, 0 to 1.
     coverage COVERAGE: f32 = 0.0;
+    /// How many surfaces the ray through the voxel's centre passes, 65,535 at most; 0 where nothing is.
+    passages PASSAGES: u16 = 0;
 }
 
 impl<const D: usize> GBuffer<D> {
@@ -162,6 +170,11 @@ impl<const D: usize> GBuffer<D> {
     /// Which columns it has.
     pub fn columns(&self) -> Columns {
         self.columns
+    }
+
+    /// The part of what is behind a voxel that it hides: its coverage, less what light passes.
+    pub fn opacity(&self, voxel: usize) -> f32 {
+        self.coverage[voxel] * (1.0 - self.through.get(voxel).copied().unwrap_or_default())
     }
 
     /// How many voxels there are.

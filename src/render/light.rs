@@ -10,7 +10,7 @@
 //! ```
 //!
 //! with the surface's reflectance c, the ambient light a and its occlusion A, the light's strength E there, the visibility V
-//! of the light (0 or 1), the specular reflectance s and the shininess m (Lambert; Blinn 1977). E = 1 shows a white surface
+//! of the light (0 or 1, or what objects that let light through leave of it), the specular reflectance s and the shininess m (Lambert; Blinn 1977). E = 1 shows a white surface
 //! that faces the light as white. A light at a point sends what it has through ever larger spheres, so E falls as
 //! 1 / r^(D-1): by the square of the distance in 3D and by its cube in 4D.
 //!
@@ -117,10 +117,11 @@ impl<const D: usize> Lighting<D> {
             let point = narrow(&lit.point);
             let Some((towards, distance)) = light.source.from(&widen(&point)) else { continue };
             let cosine = lit.normal.dot(&towards);
-            if cosine <= 0.0
-                || lit.facing.dot(&towards) <= 0.0
-                || !is_lit(tracer, point, lit.simplex, towards, distance)
-            {
+            if cosine <= 0.0 || lit.facing.dot(&towards) <= 0.0 {
+                continue;
+            }
+            let arriving = arriving(tracer, point, lit.simplex, towards, distance);
+            if arriving == 0.0 {
                 continue;
             }
             reached.store(true, Ordering::Relaxed);
@@ -136,7 +137,7 @@ impl<const D: usize> Lighting<D> {
             };
             for c in 0..3 {
                 // As near to a light as can be it is infinitely bright.
-                let strength = (light.strength[c] * falloff).min(f64::from(f32::MAX));
+                let strength = (light.strength[c] * falloff).min(f64::from(f32::MAX)) * arriving;
                 sum[c] += strength * (lit.reflectance[c] * cosine + highlight);
             }
         }
@@ -171,8 +172,14 @@ impl<const D: usize> Source<D> {
     }
 }
 
-/// Whether nothing is in the way from a point inside a simplex to a light.
-fn is_lit<const D: usize>(tracer: &Tracer<D>, point: Vector<D>, own: u32, towards: Vector64<D>, distance: f64) -> bool {
+/// The share of a light that arrives at a point inside a simplex: 1 or 0, unless light passes some objects.
+fn arriving<const D: usize>(
+    tracer: &Tracer<D>,
+    point: Vector<D>,
+    own: u32,
+    towards: Vector64<D>,
+    distance: f64,
+) -> f64 {
     let (ray, limit) = (Ray::new(point, narrow(&towards)), distance as f32);
     let point = widen(&point);
     let rounding = ROUNDING * point.norm();
@@ -181,7 +188,9 @@ fn is_lit<const D: usize>(tracer: &Tracer<D>, point: Vector<D>, own: u32, toward
         let normal = normal_of(&corners);
         normal.dot(&(point - corners[0])).abs() <= rounding * normal.norm()
     };
-    !tracer
-        .bvh()
-        .any(&ray, limit, |simplex| simplex != own && tracer.hits(simplex, &ray, limit) && !is_in_plane(simplex))
+    if tracer.mesh().is_translucent() {
+        return tracer.transmitted(&ray, limit, |simplex| simplex == own || is_in_plane(simplex));
+    }
+    let hides = |simplex: u32| simplex != own && tracer.hits(simplex, &ray, limit) && !is_in_plane(simplex);
+    if tracer.bvh().any(&ray, limit, hides) { 0.0 } else { 1.0 }
 }

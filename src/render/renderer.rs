@@ -6,13 +6,18 @@ use std::sync::Arc;
 use super::audit::Audit;
 use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
+use super::layers::LayerPass;
 use super::samples::Sampling;
 use super::skylight::shine;
 use super::surface::SurfacePass;
-use super::{Accuracy, Aov, Camera, Lighting, NOTHING, Shading, Skylight, Visibility, occlude, visibility};
+use super::{
+    Accuracy, Aov, Camera, DepthImage, Lighting, NOTHING, ScreenSpace, Shading, Skylight, Visibility, behind, occlude,
+    screen_space, visibility,
+};
 use crate::accel::Tracer;
 use crate::occlusion::Error;
-use crate::progress::Progress;
+use crate::progress::{Progress, Uncounted};
+use crate::trace::cpu::CpuBackend;
 use crate::trace::{self, RayBackend};
 use crate::volume::{Array, Grid, Volume};
 
@@ -34,11 +39,13 @@ pub struct Renderer<const D: usize> {
     pub lighting: Option<Lighting<D>>,
     /// The sky, and the light of other surfaces; none is a sky that shines on all sides alike. Of a picture that is not lit
     /// only the arrays show it.
-    pub skylight: Option<Skylight<D>>,
+    pub skylight: Option<Arc<Skylight<D>>>,
     /// How it is found out what voxels see; changes the time only.
     pub visibility: visibility::Method,
     /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
     pub supersample: usize,
+    /// How many layers arrays are made of, at most [`super::MOST_LAYERS`].
+    pub layers: usize,
     /// What looks at neighbouring voxels, in this order.
     pub filters: Vec<Box<dyn ImageFilter<D>>>,
     /// The rays that some voxels are looked at again with, to measure how far off the picture is; others than its own.
@@ -50,7 +57,7 @@ pub struct Renderer<const D: usize> {
 pub struct Slab {
     /// Which layers.
     pub layers: Range<usize>,
-    /// The arrays that were asked for, in that order.
+    /// The arrays that were asked for, in that order; those of layers one after the other.
     pub arrays: Vec<Array>,
     /// How many of their voxels see something.
     pub seen: u64,
@@ -63,12 +70,23 @@ impl<const D: usize> Renderer<D> {
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
-        let (lighting, skylight, filters, audit) = (None, None, Vec::new(), None);
-        Self { backend, camera, grid, shading, lighting, skylight, visibility, supersample: 1, filters, audit }
+        Self {
+            backend,
+            camera,
+            grid,
+            shading,
+            lighting: None,
+            skylight: None,
+            visibility,
+            supersample: 1,
+            layers: 0,
+            filters: Vec::new(),
+            audit: None,
+        }
     }
 
     /// The scene.
-    pub fn tracer(&self) -> &Tracer<D> {
+    pub fn tracer(&self) -> &Arc<Tracer<D>> {
         self.backend.tracer()
     }
 
@@ -91,6 +109,10 @@ impl<const D: usize> Renderer<D> {
         let sampling = Sampling::new(&self.camera, &self.grid, self.supersample);
         let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
         let columns = self.columns(aovs);
+        let depth_image = match self.shading {
+            Shading::ScreenSpace(settings) => Some(self.depth_image(settings, progress)?),
+            _ => None,
+        };
         let pass = SurfacePass {
             tracer: self.tracer(),
             camera: &self.camera,
@@ -98,23 +120,43 @@ impl<const D: usize> Renderer<D> {
             visibility: &visibility,
             shading: &self.shading,
             lighting: self.lighting.as_ref(),
-            skylight: self.skylight.as_ref(),
+            skylight: self.skylight.as_deref(),
         };
         if columns.contains(Columns::DIRECT) {
             self.tracer().prepare();
         }
+        // Of the voxels' centres, and by the processor.
+        let layered = aovs.iter().any(|aov| aov.needs_layers()).then(|| {
+            let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Arc::clone(self.tracer())));
+            Visibility::new(backend, &self.camera, &self.grid, self.visibility)
+        });
+        let layered = layered.as_ref().map(|visibility| LayerPass {
+            backend: &*self.backend,
+            camera: &self.camera,
+            grid: &self.grid,
+            visibility,
+            shading: &self.shading,
+            most: self.layers,
+            occluded: aovs.contains(&Aov::LayerAmbientOcclusion),
+        });
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
             let mut buffer = pass.layers(layers, columns, progress)?;
+            if columns.intersects(behind::COLUMNS) {
+                behind::add(&pass, &*self.backend, &mut buffer, progress)?;
+            }
             match self.shading {
                 Shading::Voxel(estimator) => {
-                    let skylight = self.skylight.as_ref();
+                    let skylight = self.skylight.as_deref();
                     occlude::occlude_and_light(&*self.backend, estimator, &mut buffer, skylight, progress)?;
                 }
                 Shading::Auto(_, estimator) => {
                     buffer.interpolated.copy_from_slice(&buffer.occlusion);
                     occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?;
                 }
-                Shading::None | Shading::Flat(_) | Shading::Smooth(_) => {}
+                Shading::None | Shading::Flat(_) | Shading::Smooth(_) | Shading::ScreenSpace(_) => {}
+            }
+            if let Some(image) = &depth_image {
+                screen_space::occlude(image, &mut buffer, progress)?;
             }
             Ok(buffer)
         };
@@ -122,12 +164,15 @@ impl<const D: usize> Renderer<D> {
         let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
         for first in (0..depth).step_by(thickness) {
             let mut buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
-            shine(self.skylight.as_ref(), &mut buffer);
+            shine(self.skylight.as_deref(), &mut buffer);
+            let layers = layered.as_ref().map(|pass| pass.layers(buffer.layers(), progress)).transpose()?;
+            let layers = layers.unwrap_or_default();
+            buffer.passages.iter_mut().enumerate().for_each(|(i, count)| *count = layers.count(i));
             let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
             if let Some(audit) = &mut audit {
                 audit.add(&buffer);
             }
-            let arrays = aovs.iter().map(|aov| aov.array(&buffer)).collect();
+            let arrays = aovs.iter().flat_map(|aov| aov.arrays(&buffer, &layers)).collect();
             let is_behind = |simplex: u32| simplex != NOTHING && visibility.is_away(simplex);
             let behind = buffer.simplex.iter().filter(|&&simplex| is_behind(simplex)).count() as u64;
             sink(Slab { layers: buffer.layers(), arrays, seen, behind })?;
@@ -148,6 +193,31 @@ impl<const D: usize> Renderer<D> {
         Ok(Volume { grid: self.grid, arrays, field_data: Vec::new() })
     }
 
+    /// What the voxels' centres see, as far as screen space looks at it; made slab by slab too.
+    fn depth_image(&self, settings: ScreenSpace, progress: &dyn Progress) -> Result<DepthImage<D>, Error> {
+        let sampling = Sampling::new(&self.camera, &self.grid, 1);
+        let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
+        let pass = SurfacePass {
+            tracer: self.tracer(),
+            camera: &self.camera,
+            sampling: &sampling,
+            visibility: &visibility,
+            shading: &Shading::None,
+            lighting: None,
+            skylight: None,
+        };
+        let columns = Columns::SIMPLEX | Columns::DEPTH;
+        let [_, _, layers] = self.grid.dimensions;
+        let voxel = columns.bytes::<D>() + size_of::<u32>();
+        let thickness = (SLAB_BYTES / voxel / self.grid.layer_len().max(1)).clamp(1, layers);
+        let mut distances = Vec::with_capacity(self.grid.len());
+        for first in (0..layers).step_by(thickness) {
+            let slab = pass.layers(first..layers.min(first + thickness), columns, &Uncounted(progress))?;
+            distances.extend(slab.depth);
+        }
+        Ok(DepthImage::new(&self.camera, &self.grid, distances, settings))
+    }
+
     /// The columns that arrays and filters need.
     fn columns(&self, aovs: &[Aov]) -> Columns {
         let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
@@ -161,7 +231,10 @@ impl<const D: usize> Renderer<D> {
             }
         }
         if columns.contains(Columns::IRRADIANCE) {
-            columns |= Columns::OCCLUSION | self.skylight.as_ref().map_or(Columns::empty(), Skylight::columns);
+            columns |= Columns::OCCLUSION | self.skylight.as_deref().map_or(Columns::empty(), Skylight::columns);
+        }
+        if self.tracer().mesh().is_translucent() && columns.intersects(Columns::ALBEDO | Columns::COVERAGE) {
+            columns |= behind::COLUMNS;
         }
         columns
     }
@@ -175,7 +248,7 @@ impl<const D: usize> Renderer<D> {
 
     /// Bytes that a voxel takes while its slab is made.
     fn bytes_per_voxel(&self, aovs: &[Aov]) -> usize {
-        bytes_per_voxel::<D>(self.columns(aovs), self.supersample, aovs)
+        bytes_per_voxel::<D>(self.columns(aovs), self.supersample, self.layers, aovs)
     }
 }
 
@@ -184,13 +257,14 @@ fn columns(shading: &Shading, aovs: &[Aov]) -> Columns {
     let point = match shading {
         Shading::Voxel(_) => occlude::COLUMNS,
         Shading::Auto(..) => occlude::COLUMNS | Columns::OCCLUSION | Columns::INTERPOLATED,
+        Shading::ScreenSpace(_) => screen_space::COLUMNS,
         Shading::None | Shading::Flat(_) | Shading::Smooth(_) => Columns::SIMPLEX,
     };
     aovs.iter().fold(point, |all, aov| all | aov.columns())
 }
 
 /// Bytes that a voxel takes in the G-buffer, in arrays, and while its samples are looked at.
-fn bytes_per_voxel<const D: usize>(columns: Columns, supersample: usize, aovs: &[Aov]) -> usize {
+fn bytes_per_voxel<const D: usize>(columns: Columns, supersample: usize, layers: usize, aovs: &[Aov]) -> usize {
     let samples = supersample.pow(D as u32 - 1) * size_of::<u32>();
-    samples + columns.bytes::<D>() + aovs.iter().map(|aov| aov.bytes::<D>()).sum::<usize>()
+    samples + columns.bytes::<D>() + aovs.iter().map(|aov| aov.bytes::<D>() * aov.count(layers)).sum::<usize>()
 }

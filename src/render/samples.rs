@@ -6,10 +6,10 @@
 
 use std::ops::Range;
 
-use super::{Camera, NOTHING, Visibility};
+use super::{Camera, NOTHING, Passages, Visibility};
 use crate::geometry::Ray;
 use crate::occlusion::Error;
-use crate::progress::Progress;
+use crate::progress::{Progress, Uncounted};
 use crate::volume::Grid;
 
 /// The most samples along an axis.
@@ -41,6 +41,19 @@ pub(super) struct Group {
     pub count: usize,
     /// The sums of their places among the voxel's samples.
     sums: [usize; 3],
+}
+
+impl Group {
+    /// Adds a sample at this place among the voxel's to the group of what it sees.
+    fn add(groups: &mut Vec<Self>, simplex: u32, place: [usize; 3]) -> usize {
+        let group = groups.iter().position(|group| group.simplex == simplex).unwrap_or_else(|| {
+            groups.push(Self { simplex, count: 0, sums: [0; 3] });
+            groups.len() - 1
+        });
+        groups[group].count += 1;
+        (0..3).for_each(|a| groups[group].sums[a] += place[a]);
+        group
+    }
 }
 
 impl Sampling {
@@ -80,6 +93,32 @@ impl Sampling {
         Ok(visibility.first_hits(layers.start * z..layers.end * z, progress)?)
     }
 
+    /// All that the samples of some layers of voxels pass.
+    ///
+    /// # Errors
+    /// Those of [`Visibility::passages`].
+    pub fn passages<const D: usize>(
+        &self,
+        visibility: &Visibility<D>,
+        layers: &Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<Passages, Error> {
+        let z = self.per_axis[2];
+        Ok(visibility.passages(layers.start * z..layers.end * z, usize::MAX, &Uncounted(progress))?)
+    }
+
+    /// Where the samples of voxel (i, j) of the `layer`-th layer are among those of these layers, with their numbers.
+    pub fn of_voxel(&self, [i, j, layer]: [usize; 3]) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let ([x, y, z], [width, height, _]) = (self.per_axis, self.fine.dimensions);
+        let first = i * x + width * (j * y + height * layer * z);
+        self.offsets.iter().enumerate().map(move |(n, offset)| (n, first + offset))
+    }
+
+    /// Adds sample `n` of a voxel to the group of what it sees; returns which that is.
+    pub fn add_to(&self, groups: &mut Vec<Group>, simplex: u32, n: usize) -> usize {
+        Group::add(groups, simplex, self.places[n])
+    }
+
     /// What the samples of voxel (i, j) of the `layer`-th layer see, of what [`Sampling::first_hits`] found: the groups
     /// of those that see something, in the order of their first samples; and the sample nearest to the centre that does,
     /// with its simplex.
@@ -99,13 +138,7 @@ impl Sampling {
             if simplex == NOTHING {
                 continue;
             }
-            match groups.iter_mut().find(|group| group.simplex == simplex) {
-                Some(group) => {
-                    group.count += 1;
-                    (0..3).for_each(|a| group.sums[a] += place[a]);
-                }
-                None => groups.push(Group { simplex, count: 1, sums: place }),
-            }
+            Group::add(groups, simplex, place);
         }
         self.by_distance.iter().map(|&n| (n, samples[self.offsets[n]])).find(|&(_, simplex)| simplex != NOTHING)
     }

@@ -32,10 +32,10 @@ pub(super) struct SurfacePass<'r, const D: usize> {
 }
 
 /// Where a ray meets a simplex.
-struct Hit<const D: usize> {
-    simplex: u32,
-    ray: Ray<D>,
-    crossing: Crossing<D>,
+pub(super) struct Hit<const D: usize> {
+    pub simplex: u32,
+    pub ray: Ray<D>,
+    pub crossing: Crossing<D>,
 }
 
 /// What is left from voxel to voxel of a row.
@@ -104,6 +104,12 @@ impl<const D: usize> SurfacePass<'_, D> {
         Ok(buffer)
     }
 
+    /// How much of what is behind a simplex it hides.
+    pub fn opacity_of(&self, simplex: u32) -> f64 {
+        let mesh = self.tracer.mesh();
+        f64::from(mesh.objects[mesh.object_of(simplex)].opacity)
+    }
+
     /// Fills in one voxel, whose groups are in `scratch` and whose point is what `sample` sees of `simplex`.
     #[inline]
     fn voxel(&self, index: [usize; 3], sample: usize, simplex: u32, scratch: &mut Scratch<D>, out: &mut RowMut<D>) {
@@ -141,20 +147,22 @@ impl<const D: usize> SurfacePass<'_, D> {
             let ray = self.sampling.mean_ray(self.camera, index, &group);
             let crossing = scratch.cone(self.tracer, group.simplex, &ray.origin).crossing(&ray.direction);
             let hit = Hit { simplex: group.simplex, ray, crossing };
-            let (occlusion, error) = self.shaded(&hit);
+            let vertices = mesh.simplices[group.simplex as usize];
+            let (occlusion, error) = self.shading.at_vertices(vertices, &hit.crossing.barycentric);
             let (weight, occlusion) = (group.count as f64, f64::from(occlusion));
             means.samples += weight;
             means.depth += weight * hit.depth();
             means.occlusion += weight * occlusion;
             means.error += weight * f64::from(error);
             let color = mesh.objects[mesh.object_of(group.simplex)].color;
+            let kept = weight * self.opacity_of(group.simplex);
             let ambient = match self.lighting {
                 None => color.map(f64::from),
                 Some(lighting) => reflectance(color).map(|c| c * lighting.ambient * lighting.cue(hit.depth()).0),
             };
             for (c, color) in ambient.into_iter().enumerate() {
-                means.albedo[c] += weight * color;
-                means.lit[c] += weight * color * occlusion;
+                means.albedo[c] += kept * color;
+                means.lit[c] += kept * color * occlusion;
             }
             if has_sky {
                 self.add_sky(&hit, weight, &mut means.sky);
@@ -177,13 +185,14 @@ impl<const D: usize> SurfacePass<'_, D> {
         for g in 0..scratch.groups.len() {
             let simplex = scratch.groups[g].simplex;
             let reflectance = reflectance(mesh.objects[mesh.object_of(simplex)].color);
+            let opacity = self.opacity_of(simplex);
             for sample in samples(simplex) {
                 let ray = self.sampling.ray(self.camera, index, sample);
                 let crossing = scratch.cone(self.tracer, simplex, &ray.origin).crossing(&ray.direction);
                 let hit = Hit { simplex, ray, crossing };
                 let light = lighting.direct(self.tracer, &self.lit(&hit, reflectance));
                 let (left, cue) = lighting.cue(hit.depth());
-                (0..3).for_each(|c| sum[c] += light[c] * left + cue[c]);
+                (0..3).for_each(|c| sum[c] += (light[c] * left + cue[c]) * opacity);
                 count += 1.0;
             }
         }
@@ -201,8 +210,8 @@ impl<const D: usize> SurfacePass<'_, D> {
                 sky.vector += open_vector(&widen(&facing(normal, &hit.ray))) * weight;
                 return;
             }
-            // Found at the point itself.
-            Shading::Voxel(_) => return,
+            // Found at the point itself, or not at all.
+            Shading::Voxel(_) | Shading::ScreenSpace(_) => return,
             Shading::Flat(_) => [weight / D as f64; D],
             Shading::Smooth(_) | Shading::Auto(..) => hit.crossing.barycentric.map(|w| w * weight),
         };
@@ -223,7 +232,7 @@ impl<const D: usize> SurfacePass<'_, D> {
     }
 
     /// What lights ask of a point.
-    fn lit(&self, hit: &Hit<D>, reflectance: [f64; 3]) -> Lit<D> {
+    pub(super) fn lit(&self, hit: &Hit<D>, reflectance: [f64; 3]) -> Lit<D> {
         let mesh = self.tracer.mesh();
         let corners = mesh.corners(hit.simplex).map(|v| widen(&v));
         let (vertices, weights) = (mesh.simplices[hit.simplex as usize], hit.crossing.barycentric);
@@ -244,31 +253,11 @@ impl<const D: usize> SurfacePass<'_, D> {
             reflectance,
         }
     }
-
-    /// Occlusion and its standard error by the values at the simplex's vertices; open where there are none.
-    #[inline]
-    fn shaded(&self, hit: &Hit<D>) -> (f32, f32) {
-        let vertices = self.tracer.mesh().simplices[hit.simplex as usize];
-        let corner = |values: &[f32], i: usize| values.get(vertices[i] as usize).map_or(f64::NAN, |&v| f64::from(v));
-        let equal = [1.0 / D as f64; D];
-        let (estimates, weights) = match self.shading {
-            Shading::Flat(estimates) => (estimates, &equal),
-            Shading::Smooth(estimates) | Shading::Auto(estimates, _) => (estimates, &hit.crossing.barycentric),
-            Shading::None | Shading::Voxel(_) => return (1.0, 0.0),
-        };
-        let value = match self.shading {
-            Shading::Flat(_) => (0..D).map(|i| corner(&estimates.values, i)).sum::<f64>() / D as f64,
-            _ => (0..D).map(|i| corner(&estimates.values, i) * weights[i]).sum::<f64>(),
-        };
-        // The vertices' errors are independent.
-        let variance: f64 = (0..D).map(|i| (corner(&estimates.errors, i) * weights[i]).powi(2)).sum();
-        ((value as f32).clamp(0.0, 1.0), variance.sqrt() as f32)
-    }
 }
 
 impl<const D: usize> Hit<D> {
     /// Distance from the eye.
-    fn depth(&self) -> f64 {
+    pub(super) fn depth(&self) -> f64 {
         self.crossing.t * widen(&self.ray.direction).norm()
     }
 }
@@ -330,7 +319,7 @@ fn set<T>(column: &mut [T], i: usize, value: impl FnOnce() -> T) {
 
 /// A normal at length 1, on the side that the ray comes from.
 #[inline]
-fn facing<const D: usize>(normal: Vector64<D>, ray: &Ray<D>) -> Vector<D> {
+pub(super) fn facing<const D: usize>(normal: Vector64<D>, ray: &Ray<D>) -> Vector<D> {
     let towards = normal.dot(&widen(&ray.direction)) > 0.0;
     unit(&if towards { -normal } else { normal })
 }

@@ -13,7 +13,7 @@
 //! | `cut_cube` | a box minus boxes | [`lattice`] |
 //! | `hypersphere`, `sphere` | the cross-polytope's boundary, divided and projected | - |
 //! | `spin` | a 3D mesh turned round in a plane with w | [`crate::io::mesh`], [`product`] |
-//! | `polytope` | one of the six regular polytopes | - |
+//! | `polytope` | one of the six regular polytopes, in 3D polyhedra | `polyhedron` |
 //! | `duoprism`, `duocylinder`, `spherinder`, `cubinder` | boundary of a product of two solids | [`product`] |
 //! | `isosurface` | where a formula or a grid of values passes a value | [`isosurface`] |
 //!
@@ -32,12 +32,14 @@ pub mod isosurface;
 pub mod lattice;
 mod numbers;
 mod object;
+mod polyhedron;
 pub mod polytope;
 pub mod product;
 mod products;
 mod simplices;
 mod spin;
 mod transform;
+mod twin;
 
 pub use color::Color;
 pub use cuboid::{BoxSpec, TesseractSpec};
@@ -48,10 +50,11 @@ pub use hypersphere::{Base, SphereSpec};
 pub use isosurface::IsosurfaceSpec;
 pub use numbers::{MAX_SIMPLICES, OneOrEach};
 pub use object::{
-    CreaseAngle, ObjectSpec, Orientation, Shape, build_object, build_object_watched, build_object_with_notes,
+    CreaseAngle, ObjectSpec, Orientation, Shape, build_object, build_object_watched, build_object_with_notes, moved,
 };
 pub use polytope::PolytopeSpec;
 pub use products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 pub use simplices::SimplicesSpec;
 pub use spin::SpinSpec;
-pub use transform::{RotateSpec, TransformStep};
+pub use transform::{RotateSpec, TransformStep, plane_of, sine_cosine};
+pub use twin::{place, plane, twin};

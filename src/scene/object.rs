@@ -62,7 +62,7 @@ pub struct ObjectSpec {
     /// Shape: a three-dimensional mesh turned round in a plane with w.
     #[serde(default)]
     pub spin: Option<SpinSpec>,
-    /// Shape: a regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell.
+    /// Shape: a regular polytope: 5-, 8-, 16-, 24-, 120- or 600-cell; in 3D a polyhedron.
     #[serde(default)]
     pub polytope: Option<PolytopeSpec>,
     /// Shape: the product of two regular polygons.
@@ -83,6 +83,11 @@ pub struct ObjectSpec {
     /// The colour; a light grey of 0.8 if left out.
     #[serde(default)]
     pub color: Color,
+    /// The share of light that each of the object's surfaces keeps from passing, 0 to 1 (default 1, opaque). A ray through a
+    /// body passes two surfaces, or more, so of a body of 0.3 about half is seen through.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1))]
+    pub opacity: Option<f64>,
     /// Which way the surface faces: `input` (default), open surfaces by the order of their vertices, closed ones outwards; or
     /// `eye`, where it is seen from by the first render of the scene, so that a closed surface around the eye is a room.
     #[serde(default)]
@@ -269,6 +274,15 @@ impl ObjectSpec {
 }
 
 impl ObjectSpec {
+    /// How much light each of its surfaces keeps from passing.
+    pub fn surface_opacity(&self) -> Result<f32, Error> {
+        match self.opacity {
+            None => Ok(1.0),
+            Some(opacity) if (0.0..=1.0).contains(&opacity) => Ok(opacity as f32),
+            Some(opacity) => Err(Error::invalid("opacity", format!("expected a number from 0 to 1, found {opacity}"))),
+        }
+    }
+
     /// Where the object's vertices are split.
     pub fn crease(&self) -> Result<Crease, Error> {
         Ok(match (self.crease_angle, self.shape()?) {
@@ -308,23 +322,37 @@ pub fn build_object_watched<const D: usize>(
 ) -> Result<Surface<D>, Error> {
     let shape = spec.shape()?;
     spec.color.rgb()?;
+    spec.surface_opacity()?;
     let mut surface = shape.build::<D>(folder, notes, progress)?;
     let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;
-    // Coordinates are rounded to single precision afterwards and must survive that.
-    let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);
-    if let Some((i, vertex)) = surface.vertices.iter().enumerate().find(|(_, vertex)| vertex.iter().any(too_large)) {
-        let axis = vertex.iter().position(too_large).unwrap_or_default();
-        let key = if spec.transform.is_empty() { shape.key() } else { "transform" };
-        return Err(Error::invalid(
-            key,
-            format!("vertex {i} has {} = {:e}, beyond single precision (3.4e38)", AXES[axis], vertex[axis]),
-        ));
-    }
+    check_single_precision(&surface, if spec.transform.is_empty() { shape.key() } else { "transform" })?;
     if !solid.is_empty() {
         check_solid(&surface, &solid)?;
     }
     Ok(surface)
+}
+
+/// A surface that is in its place, moved on by further steps: as if these stood at the end of its object's `transform`.
+///
+/// # Errors
+/// Whatever is wrong with a step, or if it leads beyond single precision.
+pub fn moved<const D: usize>(surface: &Surface<D>, steps: &[TransformStep]) -> Result<Surface<D>, Error> {
+    let mut moved = surface.clone();
+    transform::apply("transform", steps, &mut moved)?;
+    check_single_precision(&moved, "transform")?;
+    Ok(moved)
+}
+
+/// Coordinates are rounded to single precision later and must survive that.
+fn check_single_precision<const D: usize>(surface: &Surface<D>, key: &str) -> Result<(), Error> {
+    let too_large = |x: &f64| !x.is_finite() || x.abs() > f64::from(f32::MAX);
+    let Some((i, vertex)) = surface.vertices.iter().enumerate().find(|(_, vertex)| vertex.iter().any(too_large)) else {
+        return Ok(());
+    };
+    let axis = vertex.iter().position(too_large).unwrap_or_default();
+    let message = format!("vertex {i} has {} = {:e}, beyond single precision (3.4e38)", AXES[axis], vertex[axis]);
+    Err(Error::invalid(key, message))
 }
 
 /// Refuses a filled solid whose tetrahedra fold over when rounded: it would shadow itself.

@@ -1,4 +1,4 @@
-//! The six regular polytopes of R^4.
+//! The six regular polytopes of R^4; in R^3 the polyhedra of [`super::polyhedron`].
 //!
 //! Each is given by its vertices and by the directions of its cells: a cell's vertices are those that lie furthest along
 //! its direction. Polytopes come in dual pairs, whose cells are in the directions of the other's vertices: 8 and 16, 120
@@ -27,18 +27,19 @@ use serde::{Deserialize, Serialize};
 
 use super::Error;
 use super::hypersphere::standard_facet;
-use super::numbers::{check_count, only_in, positive};
+use super::numbers::{check_count, positive};
+use super::polyhedron::Faces;
 use crate::geometry::{Dimension, Vector64, determinant};
 use crate::mesh::Surface;
 
 /// How much shorter two lengths may be and still count as the same; all lengths here are near 1.
 const SAME: f64 = 1e-9;
 
-/// A regular polytope around the origin.
+/// A regular polytope around the origin; in 3D a regular polyhedron or the cuboctahedron.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolytopeSpec {
-    /// The number of its cells: 5, 8, 16, 24, 120 or 600.
+    /// The number of its cells: 5, 8, 16, 24, 120 or 600; in 3D that of its faces: 4, 6, 8, 12, 14 or 20.
     pub cells: u32,
     /// The length of its edges; if left out, such that its vertices are 1 away from the origin.
     #[serde(default)]
@@ -93,23 +94,35 @@ impl Cells {
 }
 
 impl PolytopeSpec {
-    /// The polytope's boundary; refused in 3D.
+    /// The polytope's boundary.
     pub fn build<const D: usize>(&self) -> Result<Surface<D>, Error> {
-        only_in::<D>(Dimension::Four, "polytope", "; take box or sphere")?;
-        let Some(cells) = Cells::of(self.cells) else {
-            let message = format!("there is none of {} cells; the six have 5, 8, 16, 24, 120 and 600", self.cells);
-            return Err(Error::invalid("polytope.cells", message));
-        };
         let key = "polytope.subdivisions";
         if self.subdivisions == 0 {
             return Err(Error::invalid(key, "0 subdivisions; the least is 1"));
         }
-        check_count(key, cells.tetrahedra() * u128::from(self.subdivisions).pow(3))?;
+        let pieces = u128::from(self.subdivisions).pow(D as u32 - 1);
         let size = self.size.map(|size| positive("polytope.size", size)).transpose()?;
-        let mut surface = regular::<D>(cells, self.subdivisions);
+        let none = |kind: &str, all: &str| {
+            let message = format!("there is none of {} {kind}; the six have {all}", self.cells);
+            Error::invalid("polytope.cells", message)
+        };
+        let (mut surface, edge) = match Dimension::of::<D>() {
+            Dimension::Three => {
+                let faces = Faces::of(self.cells).ok_or_else(|| none("faces", "4, 6, 8, 12, 14 and 20"))?;
+                check_count(key, faces.triangles() * pieces)?;
+                let (surface, edge) = faces.surface();
+                let vertices = surface.vertices.iter().map(|point| Vector64::from_fn(|axis, _| point[axis])).collect();
+                let simplices = surface.simplices.iter().map(|corners| std::array::from_fn(|i| corners[i])).collect();
+                (subdivide(&Surface { vertices, simplices, normals: None }, self.subdivisions), edge)
+            }
+            Dimension::Four => {
+                let cells = Cells::of(self.cells).ok_or_else(|| none("cells", "5, 8, 16, 24, 120 and 600"))?;
+                check_count(key, cells.tetrahedra() * pieces)?;
+                (regular::<D>(cells, self.subdivisions), edge_length(&vertices(cells)))
+            }
+        };
         if let Some(size) = size {
-            let scale = size / edge_length(&vertices(cells));
-            surface.vertices.iter_mut().for_each(|vertex| *vertex *= scale);
+            surface.vertices.iter_mut().for_each(|vertex| *vertex *= size / edge);
         }
         Ok(surface)
     }
@@ -238,7 +251,7 @@ fn cut(points: &[Point], directions: &[Point]) -> Vec<[u32; 4]> {
     tetrahedra
 }
 
-/// Cuts every tetrahedron into n^3. D is 4.
+/// Cuts every simplex into n^(D-1), which share their corners.
 fn subdivide<const D: usize>(surface: &Surface<D>, n: u32) -> Surface<D> {
     if n == 1 {
         return surface.clone();

@@ -59,6 +59,9 @@ impl TransformStep {
 }
 
 /// Applies the steps, which are at this key, to the surface, in order.
+///
+/// # Errors
+/// Whatever is wrong with a step.
 pub fn apply<const D: usize>(key: &str, steps: &[TransformStep], surface: &mut Surface<D>) -> Result<(), Error> {
     for (i, step) in steps.iter().enumerate() {
         let key = format!("{key}.{i}");
@@ -125,14 +128,19 @@ fn rotate<const D: usize>(surface: &mut Surface<D>, rotation: &RotateSpec, key: 
 }
 
 fn plane<const D: usize>(name: &str) -> Option<(usize, usize)> {
-    let axis = |letter: char| AXES[..D].iter().position(|axis| axis.starts_with(letter));
+    plane_of(name, D)
+}
+
+/// The two axes, among so many, of a plane such as `xw`: the first is turned towards the second.
+pub fn plane_of(name: &str, axes: usize) -> Option<(usize, usize)> {
+    let axis = |letter: char| AXES[..axes].iter().position(|axis| axis.starts_with(letter));
     let mut letters = name.chars();
     let (from, to) = (axis(letters.next()?)?, axis(letters.next()?)?);
     (letters.next().is_none() && from != to).then_some((from, to))
 }
 
-/// Exact for multiples of 90 degrees.
-fn sine_cosine(degrees: f64) -> (f64, f64) {
+/// Sine and cosine of an angle; exact for multiples of 90 degrees.
+pub fn sine_cosine(degrees: f64) -> (f64, f64) {
     let turn = degrees.rem_euclid(360.0);
     // The remainder can round up to 360 itself.
     let quarter = (turn / 90.0).floor();

@@ -49,7 +49,7 @@ pub enum Projection {
 }
 
 /// Where a scene is seen from, every vector with as many numbers as the scene has dimensions.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct CameraPlan {
     /// How rays leave the eye.
     pub projection: ProjectionPlan,
@@ -64,7 +64,7 @@ pub struct CameraPlan {
 }
 
 /// How rays leave the eye.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProjectionPlan {
     /// From one point.
@@ -80,6 +80,16 @@ pub enum ProjectionPlan {
 }
 
 impl CameraPlan {
+    /// What would be written for it, nothing left out.
+    pub(super) fn spec(&self) -> CameraSpec {
+        let (projection, field_of_view, height) = match self.projection {
+            ProjectionPlan::Perspective { field_of_view } => (Projection::Perspective, Some(field_of_view), None),
+            ProjectionPlan::Parallel { height } => (Projection::Parallel, None, Some(height)),
+        };
+        let [eye, target, up] = [&self.eye, &self.target, &self.up].map(|v| Some(v.clone()));
+        CameraSpec { projection: Some(projection), eye, target, field_of_view, height, up, over: self.over.clone() }
+    }
+
     /// As it is written in a pipeline, nothing left out.
     pub(super) fn written(&self) -> Value {
         let (word, key, number) = match self.projection {

@@ -37,6 +37,9 @@ pub enum StageError {
     /// A file can't be written.
     #[error(transparent)]
     Write(#[from] io::Error),
+    /// An object can't be where a motion leads it, or an input that was right when it was read first is so no longer.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
     /// Rounding left a camera without a frame.
     #[error("a camera can't be placed")]
     Camera(#[from] CameraError),

@@ -8,7 +8,6 @@ use serde_json::{Map, Value};
 
 use super::Invalid;
 use super::camera::check_vector;
-use super::describe::grouped;
 use super::range::check_length;
 use crate::geometry::{Dimension, Vector64};
 use crate::render::tone::to_linear;
@@ -314,37 +313,50 @@ impl LightingPlan {
 }
 
 /// What to tell of lights that reached nothing.
-pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>, id: &str) -> Vec<String> {
+pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>) -> Vec<String> {
     let mut notes = Vec::new();
     for i in lighting.in_vain() {
         let why = match lighting.lights()[i].source {
             Source::Point(_) => "it is inside a body or behind one, or what is seen turns its back to it",
             Source::Directional(_) => "what is seen turns its back to it, or lies in the shadow of something",
         };
-        notes.push(format!("render {id}: lights[{i}] reaches nothing that is seen: {why}"));
+        notes.push(format!("lights[{i}] reaches nothing that is seen: {why}"));
     }
     notes
 }
 
-/// What to tell of the light of a picture that was made.
-pub(super) fn light_notes<const D: usize>(light: &Skylight<D>, session: &Session<D>, id: &str) -> Vec<String> {
-    let mut notes = Vec::new();
-    let (hits, behind) = light.seen();
-    if behind > 0 {
-        notes.push(format!(
-            "render {id}: {} of the {} rays that look for light of other surfaces see one from behind, and were told the light \
-             of its front; turn that object by `orientation`, or close it",
-            grouped(behind),
-            grouped(hits)
-        ));
+/// What was found of the light of the sky and of other surfaces for a picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightFound {
+    /// Rays that met other surfaces.
+    pub hits: u64,
+    /// How many of them met one from behind.
+    pub behind: u64,
+    /// Whether the processor traced them although OpenCL devices trace the others.
+    beside_opencl: bool,
+}
+
+impl LightFound {
+    pub fn new<const D: usize>(light: &Skylight<D>, session: &Session<D>) -> Self {
+        let (hits, behind) = light.seen();
+        Self { hits, behind, beside_opencl: session.is_on_opencl() }
     }
-    if session.is_on_opencl() {
-        notes.push(format!(
-            "render {id}: open directions and the light of other surfaces were traced on the processor, as OpenCL devices tell \
-             whether rays hit something, not what"
-        ));
+
+    /// What to tell of it; `rays` says how many meet surfaces from behind.
+    pub fn notes(&self, rays: &str) -> Vec<String> {
+        let behind = || {
+            format!(
+                "{rays} that look for light of other surfaces see one from behind, and were told the light of its front; turn \
+                 that object by `orientation`, or close it"
+            )
+        };
+        let beside = || {
+            "open directions and the light of other surfaces were traced on the processor, as OpenCL devices tell whether \
+             rays hit something, not what"
+                .to_owned()
+        };
+        (self.behind > 0).then(behind).into_iter().chain(self.beside_opencl.then(beside)).collect()
     }
-    notes
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`, `mesh`, `slice`,
-//! `wireframe`.
+//! `wireframe`, `animate`, `shade`.
 //!
 //! A stage's file holds all there is to know of it: what is written in YAML (its `Spec`), what is understood of that
 //! (its `Plan`: checked, resolved, every default filled in), its part of the key that tells whether a file is fresh, its
@@ -17,8 +17,11 @@
 //! - a `write` works on a render;
 //! - a `mesh` or a `slice` works on a scene, and has the values of an occlusion of that scene, found as a render finds them;
 //! - a `wireframe` works on the scene of a render, and looks through its camera;
-//! - a `paraview` figure works on writes, and finds them also by the name of their render.
+//! - an `animate` works on a render, whose picture it makes again and again while something moves;
+//! - a `shade` works on an image in a file;
+//! - a `paraview` figure works on writes, which it finds also by the name of their render, and on animations.
 
+pub mod animate;
 pub mod camera;
 pub mod cut;
 pub mod describe;
@@ -38,10 +41,13 @@ pub mod render;
 mod resolve;
 mod run;
 pub mod scene;
+pub mod screen_space;
+pub mod shade;
 mod skylight;
 pub mod slice;
 mod subject;
 pub(crate) mod suggest;
+mod twin;
 pub mod wireframe;
 pub mod write;
 
@@ -100,6 +106,14 @@ pub trait Stage: plan::OfKind + Serialize {
     /// The files it reads. Those that needn't exist are among them.
     fn input_files(&self, _plan: &Plan) -> Vec<PathBuf> {
         Vec::new()
+    }
+
+    /// Reads files that are no part of a scene, so that what is wrong with them is told before anything is computed.
+    ///
+    /// # Errors
+    /// Whatever is wrong with one.
+    fn check_inputs(_me: Ref<Self>, _plan: &Plan) -> Result<(), Invalid> {
+        Ok(())
     }
 
     /// Whether it shows the values of the occlusion at this place at every vertex, seen or not.
@@ -183,6 +197,8 @@ pub struct Needs {
     pub memory: u64,
     /// Bytes of large files, where they are known before.
     pub disk: u64,
+    /// What the memory holds, for complaints.
+    pub holds: &'static str,
 }
 
 /// Builds the index from its rows: a name, what is written, what is understood.
@@ -251,6 +267,10 @@ macro_rules! stages {
 
             pub fn input_files(&self, index: usize) -> Vec<PathBuf> {
                 match &self.stages[index].plan { $(StagePlan::$name(plan) => plan.input_files(self)),+ }
+            }
+
+            pub fn check_inputs(&self, index: usize) -> Result<(), Invalid> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::check_inputs(self.at(index), self)),+ }
             }
 
             pub fn wants_values(&self, index: usize, occlusion: usize) -> bool {
@@ -342,4 +362,8 @@ stages! {
     Slice: slice::SliceSpec => slice::SlicePlan;
     /// Edges of a scene's bodies as a render's camera sees them.
     Wireframe: wireframe::WireframeSpec => wireframe::WireframePlan;
+    /// A render again and again while something moves.
+    Animate: animate::AnimateSpec => animate::AnimatePlan;
+    /// Ambient occlusion for an image that is there already.
+    Shade: shade::ShadeSpec => shade::ShadePlan;
 }

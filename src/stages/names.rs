@@ -30,18 +30,24 @@ impl Outputs {
             }
         }
         let folded = name.to_lowercase();
-        for (other, owner) in &self.taken {
-            let inside = |a: &str, b: &str| b.strip_prefix(a).is_some_and(|rest| rest.starts_with('/'));
-            if *other == folded {
-                return refuse(format!("the file \"{name}\" is written by {owner} already; give it another name"));
-            }
-            if inside(other, &folded) || inside(&folded, other) {
-                return refuse(format!("\"{name}\" would have to be a file and a folder (see {owner})"));
-            }
+        if let Some(owner) = self.taken.get(&folded) {
+            return refuse(format!("the file \"{name}\" is written by {owner} already; give it another name"));
+        }
+        // A film has thousands of files, so none is held against all others.
+        let above = folded.match_indices('/').find_map(|(end, _)| self.taken.get(&folded[..end]));
+        let inside = format!("{folded}/");
+        let below = self.taken.range(inside.clone()..).next().filter(|(other, _)| other.starts_with(&inside));
+        if let Some(owner) = above.or(below.map(|(_, owner)| owner)) {
+            return refuse(format!("\"{name}\" would have to be a file and a folder (see {owner})"));
         }
         self.taken.insert(folded, path.to_owned());
         Ok(file.to_owned())
     }
+}
+
+/// The names of files as a list beside them has them.
+pub(super) fn file_names(files: &[PathBuf]) -> Vec<String> {
+    files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned()).collect()
 }
 
 /// Why a text can't name a file below the output folder.
@@ -121,6 +127,9 @@ mod tests {
             assert_eq!(outputs.claim("p", name, None).unwrap_err().to_string(), message);
         }
         assert!(outputs.claim("p", "a.vtib", None).is_ok());
+        assert!(outputs.claim("p", "a.vti-/b/c", None).is_ok());
+        let message = "p: \"a.vti-\" would have to be a file and a folder (see p)";
+        assert_eq!(outputs.claim("p", "a.vti-", None).unwrap_err().to_string(), message);
         assert!(outputs.claim("p", "b.txt", Some("vti")).is_err());
     }
 }

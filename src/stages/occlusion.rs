@@ -150,9 +150,17 @@ impl Stage for OcclusionPlan {
     }
 
     fn resolve(spec: &OcclusionSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let scene = resolver.input(path, spec.input.as_deref(), MISSING)?;
+        let scene: Ref<ScenePlan> = resolver.input(path, spec.input.as_deref(), MISSING)?;
         // Checked also beside `load`, so that taking `load` out reveals no new mistakes.
         let computation = computation(path, spec, resolver)?;
+        let method = computation.method;
+        if let Some(object) = resolver.plan[scene].translucent().filter(|_| !method.knows_opacity()) {
+            let message = format!(
+                "`{}` knows opaque objects only, and light passes {object}; use `method: sobol`, or leave out its `opacity`",
+                method.as_str()
+            );
+            return Err(Invalid::new(format!("{path}.method"), message));
+        }
         let source = match &spec.load {
             None => OcclusionSource::Compute(computation),
             Some(name) => {
@@ -327,7 +335,7 @@ impl OcclusionPlan {
 }
 
 /// Rays of an occlusion, where they are known: at most so many for a target error.
-fn rays(me: Ref<OcclusionPlan>, plan: &Plan, counts: &[Counts]) -> Option<u64> {
+pub(super) fn rays(me: Ref<OcclusionPlan>, plan: &Plan, counts: &[Counts]) -> Option<u64> {
     let vertices = counts.get(plan[me].scene.nth())?.vertices;
     let each = match &plan[me].source {
         OcclusionSource::Load(_) => 0,
@@ -379,6 +387,25 @@ pub fn values<const D: usize>(
     Ok(())
 }
 
+/// The values of another scene than the plan's, of which only this picture is made.
+///
+/// # Errors
+/// If they can't be computed, or Ctrl-C was pressed.
+pub(super) fn values_for<const D: usize>(
+    picture: (&str, &RenderPlan),
+    computation: &Computation,
+    run: &Run,
+    scene: &SceneRun<D>,
+) -> Result<Estimates, StageError> {
+    let count = scene.session.mesh().vertices.len();
+    let mut left = computation.most_rays().saturating_mul(count as u64) / 4;
+    let mut mask = vec![false; count];
+    let mask = render::mark_seen(picture, run, scene, &mut left, &mut mask)?.then_some(mask);
+    let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
+    let _running = run.progress.stage(&format!("occlusion of {}", picture.0), asked as u64);
+    Ok(scene.session.occlusion(computation.estimator(), mask.as_deref(), run.progress)?)
+}
+
 fn compute<const D: usize>(
     me: Ref<OcclusionPlan>,
     computation: &Computation,
@@ -414,7 +441,7 @@ fn mask<const D: usize>(
     for (stage, render) in plan.all::<RenderPlan>() {
         let values = render.occlusion == Some(me) && render.shading != render::Shading::Voxel;
         if values && render::is_stale(stage, plan, &|file| run.is_stale(file)) {
-            let seen = render::mark_seen(stage, run, scene, &mut left, &mut mask)?;
+            let seen = render::mark_seen((plan.id(stage), render), run, scene, &mut left, &mut mask)?;
             if !seen {
                 return Ok(None);
             }
@@ -523,6 +550,11 @@ impl Method {
 
     /// Whether its values are those of rays, and nothing else.
     pub fn is_by_rays(self) -> bool {
+        matches!(self, Method::Sobol | Method::Random | Method::Adaptive)
+    }
+
+    /// Whether it knows that light passes some objects.
+    fn knows_opacity(self) -> bool {
         matches!(self, Method::Sobol | Method::Random | Method::Adaptive)
     }
 

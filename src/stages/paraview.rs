@@ -1,12 +1,15 @@
-//! `paraview`: a ParaView state (a Python file) that shows images side by side.
+//! `paraview`: a ParaView state (a Python file) that shows images and animations side by side.
 //!
-//! It works on files alone: which ones, and where in them the voxels are, is known without making any.
+//! It works on files alone: which ones, and where in them the voxels are, is known without making any. A figure of
+//! animations has time: ParaView plays it, and run without a display the state writes a picture a frame, and a film of them.
 
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Serialize, Serializer};
 
+use super::animate::AnimatePlan;
 use super::camera::camera;
 use super::cut::{Axis, Cut};
 use super::describe::Counts;
@@ -18,6 +21,7 @@ use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, 
 use crate::geometry::Dimension;
 use crate::io::paraview;
 use crate::render::Aov;
+use crate::text::number;
 use crate::volume::Grid;
 
 /// A ParaView state (a Python file) that shows images side by side.
@@ -26,11 +30,13 @@ use crate::volume::Grid;
 pub struct ParaviewSpec {
     /// A name for messages.
     pub id: Option<String>,
-    /// The images, from left to right, by the id of their render or write (default: the nearest earlier write).
+    /// The images, from left to right, by the id of their render or write, or of an animation (default: the nearest earlier
+    /// write or animation).
     pub input: Option<OneOrMany>,
     /// The state: `NAME.py`.
     pub state: String,
-    /// The picture that the state writes when it is run: `NAME.png`.
+    /// The picture that the state writes when it is run: `NAME.png`. Of animations it is the first frame; all of them are
+    /// `NAME_0000.png`, `NAME_0001.png`, ..., and `NAME.mp4` is the film that ffmpeg makes of them, where that is installed.
     pub screenshot: Option<String>,
     /// Which files the state reads (default `vti`).
     pub reader: Option<Reader>,
@@ -89,15 +95,73 @@ impl Reader {
     }
 }
 
+/// What a panel of a figure shows. As JSON a write is its number, an animation `{animation: NUMBER}`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shown {
+    /// An image.
+    Image(Ref<WritePlan>),
+    /// One that changes.
+    Animation(Ref<AnimatePlan>),
+}
+
+impl Serialize for Shown {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Image(write) => write.serialize(serializer),
+            Self::Animation(animation) => {
+                let mut map = serializer.serialize_map(Some(1))?;
+                map.serialize_entry("animation", animation)?;
+                map.end()
+            }
+        }
+    }
+}
+
+impl Shown {
+    /// Its place among all stages.
+    pub fn index(self) -> usize {
+        match self {
+            Self::Image(write) => write.index(),
+            Self::Animation(animation) => animation.index(),
+        }
+    }
+
+    /// The render that it is of.
+    fn render(self, plan: &Plan) -> Ref<RenderPlan> {
+        match self {
+            Self::Image(write) => plan[write].render,
+            Self::Animation(animation) => plan[animation].render,
+        }
+    }
+
+    /// What its files hold.
+    fn arrays(self, plan: &Plan) -> &[Aov] {
+        match self {
+            Self::Image(write) => &plan[write].arrays,
+            Self::Animation(animation) => &plan[animation].arrays,
+        }
+    }
+
+    /// How many frames it has, and how many of them a second, if it changes.
+    fn frames(self, plan: &Plan) -> Option<(usize, f64)> {
+        match self {
+            Self::Image(_) => None,
+            Self::Animation(animation) => Some((plan[animation].files.len(), plan[animation].rate)),
+        }
+    }
+}
+
 /// A ParaView state, as understood.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FigurePlan {
-    /// The images' files, from left to right; each has the file that `reader` reads.
-    pub writes: Vec<Ref<WritePlan>>,
+    /// What it shows, from left to right; each image has the file that `reader` reads.
+    pub writes: Vec<Shown>,
     /// The state's file, below `out`.
     pub state: PathBuf,
     /// The picture's.
     pub screenshot: Option<PathBuf>,
+    /// The film's, which the state makes of animations where ffmpeg is installed.
+    pub film: Option<PathBuf>,
     /// Which files it reads.
     pub reader: Reader,
     /// How the volumes are cut open.
@@ -125,17 +189,18 @@ impl Stage for FigurePlan {
 
     fn resolve(spec: &ParaviewSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
         let reader = spec.reader.unwrap_or_default();
-        let writes = shown(spec, path, reader.format(), resolver)?;
+        let writes = with_twins(shown(spec, path, reader.format(), resolver)?, resolver);
         if reader == Reader::Vti {
             for &write in &writes {
-                let arrays = &resolver.plan[write].arrays;
+                let arrays = write.arrays(&resolver.plan);
                 if !arrays.contains(&Aov::Rgba) || !arrays.contains(&Aov::Opacity) {
-                    let id = resolver.plan.id(write);
+                    let id = &resolver.plan.stages[write.index()].id;
                     let message = format!("shows `{id}`, whose arrays lack rgba or opacity; add them to its `arrays`");
                     return Err(Invalid::new(path, message));
                 }
             }
         }
+        check_frames(resolver, path, reader, &writes)?;
         let (style, color_by) = (spec.style.unwrap_or_default(), spec.color_by.unwrap_or_default());
         if color_by == ColorBy::AmbientOcclusion {
             check_occlusion(resolver, path, reader, &writes)?;
@@ -148,6 +213,17 @@ impl Stage for FigurePlan {
         let screenshot = match &spec.screenshot {
             Some(name) => Some(resolver.outputs.claim(&format!("{path}.screenshot"), name, Some("png"))?),
             None => None,
+        };
+        let film = match (&screenshot, writes.iter().find_map(|shown| shown.frames(&resolver.plan))) {
+            (Some(picture), Some((frames, _))) => {
+                let (key, stem) = (format!("{path}.screenshot"), picture.with_extension(""));
+                let stem = stem.to_string_lossy();
+                for i in 0..frames {
+                    resolver.outputs.claim(&key, &format!("{stem}_{i:04}.png"), None)?;
+                }
+                Some(resolver.outputs.claim(&key, &format!("{stem}.mp4"), None)?)
+            }
+            _ => None,
         };
         let size = match spec.size.as_deref() {
             None => None,
@@ -168,7 +244,7 @@ impl Stage for FigurePlan {
         if let Cut::Plane(plane) = cut {
             check_length(&format!("{path}.cut.at"), plane.at)?;
         }
-        Ok(Self { writes, state, screenshot, reader, cut, size, style, color_by, colorbar })
+        Ok(Self { writes, state, screenshot, film, reader, cut, size, style, color_by, colorbar })
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -183,9 +259,14 @@ impl Stage for FigurePlan {
         std::iter::once(&self.state).chain(&self.screenshot).map(PathBuf::as_path).collect()
     }
 
+    /// The film.
+    fn files_beside(&self) -> Vec<PathBuf> {
+        self.film.iter().cloned().collect()
+    }
+
     fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
         let figure = &plan[me];
-        let writes: Vec<&str> = figure.writes.iter().map(|&write| plan.id(write)).collect();
+        let writes: Vec<&str> = figure.writes.iter().map(|shown| plan.stages[shown.index()].id.as_str()).collect();
         let picture = figure.screenshot.iter().map(|file| format!(", {}", file.display()));
         format!("{} -> {}{}", writes.join(", "), figure.state.display(), picture.collect::<String>())
     }
@@ -205,18 +286,26 @@ impl Stage for FigurePlan {
     }
 }
 
-/// The writes whose files are shown.
-fn shown(spec: &ParaviewSpec, path: &str, format: Format, resolver: &Resolver) -> Result<Vec<Ref<WritePlan>>, Invalid> {
+/// What is shown.
+fn shown(spec: &ParaviewSpec, path: &str, format: Format, resolver: &Resolver) -> Result<Vec<Shown>, Invalid> {
     let key = format.key();
     let has_file = |write: Ref<WritePlan>| resolver.plan[write].files.get(format).is_some();
     let Some(ids) = &spec.input else {
         let message = format!("there is no earlier `write` with `{key}` to show; put one first");
-        return Ok(vec![resolver.nearest(has_file).ok_or_else(|| Invalid::new(path, message))?]);
+        let image = resolver.nearest(has_file).map(Shown::Image);
+        // Animations have no other files than `.vti`.
+        let animation = resolver.nearest(|_: Ref<AnimatePlan>| format == Format::Vti).map(Shown::Animation);
+        let nearest = [image, animation].into_iter().flatten().max_by_key(|shown| shown.index());
+        return Ok(vec![nearest.ok_or_else(|| Invalid::new(path, message))?]);
     };
     let mut writes = Vec::new();
     for (name, index) in ids.iter() {
         let at = format!("{path}.input{index}");
-        let stage = resolver.lookup(&at, name, &[RenderPlan::KIND, WritePlan::KIND])?;
+        let stage = resolver.lookup(&at, name, &[RenderPlan::KIND, WritePlan::KIND, AnimatePlan::KIND])?;
+        if let Some(animation) = resolver.plan.reference(stage) {
+            writes.push(Shown::Animation(animation));
+            continue;
+        }
         let write = match resolver.plan.reference::<RenderPlan>(stage) {
             Some(render) => {
                 resolver.nearest(|write: Ref<WritePlan>| resolver.plan[write].render == render && has_file(write))
@@ -224,7 +313,7 @@ fn shown(spec: &ParaviewSpec, path: &str, format: Format, resolver: &Resolver) -
             None => resolver.plan.reference(stage).filter(|&write| has_file(write)),
         };
         let message = format!("`{name}` has no `{key}` file written before this stage");
-        writes.push(write.ok_or_else(|| Invalid::new(at, message))?);
+        writes.push(Shown::Image(write.ok_or_else(|| Invalid::new(at, message))?));
     }
     if writes.is_empty() {
         return Err(Invalid::new(format!("{path}.input"), "the list is empty; name at least one image"));
@@ -232,16 +321,55 @@ fn shown(spec: &ParaviewSpec, path: &str, format: Format, resolver: &Resolver) -
     Ok(writes)
 }
 
+/// Each image of a scene with a twin has that to its left, unless it is shown already.
+fn with_twins(writes: Vec<Shown>, resolver: &Resolver) -> Vec<Shown> {
+    let plan = &resolver.plan;
+    let twin = |shown: Shown| -> Option<Shown> {
+        let index = resolver.twin_of(shown.index())?;
+        let twin = match shown {
+            Shown::Image(_) => Shown::Image(plan.reference(index)?),
+            Shown::Animation(_) => Shown::Animation(plan.reference(index)?),
+        };
+        (!writes.contains(&twin)).then_some(twin)
+    };
+    writes.iter().flat_map(|&shown| twin(shown).into_iter().chain([shown])).collect()
+}
+
+/// Animations in one figure are played together, from their `.vti`.
+fn check_frames(resolver: &Resolver, path: &str, reader: Reader, writes: &[Shown]) -> Result<(), Invalid> {
+    let mut first: Option<(usize, f64)> = None;
+    for shown in writes {
+        let Some(frames) = shown.frames(&resolver.plan) else { continue };
+        let id = &resolver.plan.stages[shown.index()].id;
+        if reader == Reader::Raw {
+            let message = format!("`{id}` is an animation, whose frames are `.vti`; take `reader: vti`");
+            return Err(Invalid::new(format!("{path}.reader"), message));
+        }
+        let (count, rate) = *first.get_or_insert(frames);
+        if frames != (count, rate) {
+            let message = format!(
+                "animations in one figure are played together, so they need as many frames at the same rate: `{id}` has {} at \
+                 {} a second, and another {count} at {}",
+                frames.0,
+                number(frames.1),
+                number(rate)
+            );
+            return Err(Invalid::new(format!("{path}.input"), message));
+        }
+    }
+    Ok(())
+}
+
 /// A figure can colour by ambient occlusion only what its files hold.
-fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[Ref<WritePlan>]) -> Result<(), Invalid> {
+fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[Shown]) -> Result<(), Invalid> {
     let key = format!("{path}.color_by");
     if reader == Reader::Raw {
         let message = "`.raw` files hold colours alone, no ambient occlusion; take `reader: vti`, or `color_by: rgba`";
         return Err(Invalid::new(key, message));
     }
     for &write in writes {
-        if !resolver.plan[write].arrays.contains(&Aov::AmbientOcclusion) {
-            let id = resolver.plan.id(write);
+        if !write.arrays(&resolver.plan).contains(&Aov::AmbientOcclusion) {
+            let id = &resolver.plan.stages[write.index()].id;
             return Err(Invalid::new(key, format!("`{id}` has no ambient_occlusion; add it to its `arrays`")));
         }
     }
@@ -250,14 +378,24 @@ fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[Re
 
 /// Of several objects each gets a skin of its own, so the file has to tell which voxel is whose, unless it was said what
 /// it holds.
-fn add_object(resolver: &mut Resolver, write: Ref<WritePlan>) {
+fn add_object(resolver: &mut Resolver, shown: Shown) {
     let plan = &mut resolver.plan;
-    let render = plan[write].render;
+    let render = shown.render(plan);
     let volume = plan[render].dimensions[2] > 1;
     let several = plan[plan[render].scene].objects.len() > 1;
-    if !volume || !several || plan[write].arrays_given || plan[write].arrays.contains(&Aov::Object) {
+    let given = match shown {
+        Shown::Image(write) => plan[write].arrays_given,
+        Shown::Animation(animation) => plan[animation].arrays_given,
+    };
+    if !volume || !several || given || shown.arrays(plan).contains(&Aov::Object) {
         return;
     }
+    let write = match shown {
+        Shown::Image(write) => write,
+        Shown::Animation(animation) => {
+            return plan.get_mut(animation).into_iter().for_each(|animation| animation.arrays.push(Aov::Object));
+        }
+    };
     if let Some(write) = plan.get_mut(write) {
         write.arrays.push(Aov::Object);
     }
@@ -271,24 +409,34 @@ fn add_object(resolver: &mut Resolver, write: Ref<WritePlan>) {
 
 /// The state's text.
 fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
-    let dark = |write: Ref<WritePlan>| plan[plan[write].render].occlusion.is_some();
+    let dark = |shown: Shown| plan[shown.render(plan)].is_dark();
+    let twins = figure.writes.len() == 2 && plan.is_twin(figure.writes[0].index());
     let mixed = figure.writes.len() == 2 && figure.writes.iter().filter(|&&write| dark(write)).count() == 1;
     let mut panels = Vec::with_capacity(figure.writes.len());
     for &write in &figure.writes {
-        let render = &plan[plan[write].render];
+        let render = &plan[write.render(plan)];
         let grid: Grid = match plan[render.scene].dimension {
             Dimension::Three => camera::<3>(&render.camera)?.grid(render.dimensions),
             Dimension::Four => camera::<4>(&render.camera)?.grid(render.dimensions),
         };
-        let file = plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref());
-        let caption = match (figure.writes.len(), render.occlusion) {
+        let file = match write {
+            Shown::Image(write) => plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref()),
+            Shown::Animation(animation) => &plan[animation].list,
+        };
+        let caption = match (figure.writes.len(), render.is_dark()) {
             (1, _) => String::new(),
-            (2, Some(_)) if mixed => "with ambient occlusion".to_owned(),
-            (2, None) if mixed => "without ambient occlusion".to_owned(),
-            _ => plan.id(plan[write].render).replace(['-', '_'], " "),
+            (2, _) if twins => if plan.is_twin(write.index()) { "in 3D" } else { "in 4D" }.to_owned(),
+            (2, true) if mixed => "with ambient occlusion".to_owned(),
+            (2, false) if mixed => "without ambient occlusion".to_owned(),
+            _ => match write {
+                Shown::Image(write) => plan.id(plan[write].render),
+                Shown::Animation(animation) => plan.id(animation),
+            }
+            .replace(['-', '_'], " "),
         };
         panels.push(paraview::Panel { file: beside(&figure.state, file), caption, grid });
     }
+    let frames = figure.writes.iter().find_map(|shown| shown.frames(plan));
     Ok(paraview::state(&paraview::Figure {
         title: plan.name.clone(),
         program: PROGRAM.to_owned(),
@@ -310,6 +458,7 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             },
         },
         screenshot: figure.screenshot.as_ref().map(|file| beside(&figure.state, file)),
+        film: frames.map(|(frames, rate)| paraview::Film { frames, rate }),
         size: figure.size,
         style: match figure.style {
             Style::Surface => paraview::Style::Surface,

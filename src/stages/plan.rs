@@ -36,6 +36,8 @@ pub struct Planned {
     pub path: String,
     /// What it does.
     pub plan: StagePlan,
+    /// Whether it is the twin in 3D of the next stage, and not written itself.
+    pub twin: bool,
 }
 
 /// A stage's plan taken out of the sum of all kinds.

@@ -39,8 +39,8 @@ impl Prepared {
 }
 
 impl Plan {
-    /// Builds the scenes for which `wanted` says so, and reads the occlusion files that are loaded into them and wanted
-    /// too; both by their places in the plan.
+    /// Builds the scenes for which `wanted` says so, reads the occlusion files that are loaded into them and wanted too, and
+    /// checks what else is read by stages that are wanted; all by their places in the plan.
     ///
     /// # Errors
     /// Whatever is wrong with an object or a file; anything if `progress` says to stop.
@@ -59,6 +59,7 @@ impl Plan {
                 _ => None,
             });
         }
+        (0..self.stages.len()).filter(|&stage| wanted(stage)).try_for_each(|stage| self.check_inputs(stage))?;
         Ok(prepared)
     }
 

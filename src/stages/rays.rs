@@ -1,7 +1,8 @@
 //! The rays that pictures take themselves: at voxels, beside or instead of the vertices' values, and to be measured by.
 
+use super::Plan;
 use super::occlusion::{Method, OcclusionPlan, OcclusionSource, Samples};
-use super::render;
+use super::render::{self, RenderPlan};
 use crate::geometry::Dimension;
 use crate::occlusion::Estimator;
 use crate::trace::{Sampler, Sampling};
@@ -52,8 +53,7 @@ impl OcclusionPlan {
     /// how it came about.
     pub fn audit(&self) -> Option<Sampling> {
         let OcclusionSource::Compute(computation) = &self.source else { return None };
-        let max_distance = computation.max_distance.map_or(f32::INFINITY, |d| d as f32);
-        Some(Sampling { max_distance, ..Sampling::new(AUDIT_RAYS, computation.seed ^ AUDIT_SEED) })
+        Some(audit(computation.seed, computation.max_distance))
     }
 
     /// The rays that each voxel takes, if that is a fixed number of rays, for `shading: voxel`.
@@ -94,6 +94,23 @@ impl OcclusionPlan {
             _ => render::Shading::Smooth,
         }
     }
+}
+
+impl RenderPlan {
+    /// Rays to measure the picture by; none if it shows no occlusion, or one that is not known.
+    pub fn audit(&self, plan: &Plan) -> Option<Sampling> {
+        match (&self.screen_space, self.occlusion) {
+            (Some(screen_space), _) => Some(audit(plan.seed, screen_space.max_distance)),
+            (None, Some(occlusion)) => plan[occlusion].audit(),
+            (None, None) => None,
+        }
+    }
+}
+
+/// Rays to measure by what a picture with this seed shows.
+fn audit(seed: u64, max_distance: Option<f64>) -> Sampling {
+    let max_distance = max_distance.map_or(f32::INFINITY, |d| d as f32);
+    Sampling { max_distance, ..Sampling::new(AUDIT_RAYS, seed ^ AUDIT_SEED) }
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@
 //! memory as a whole.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,20 +14,24 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
-use super::lighting::{self, DepthCueSpec, LightAsked, LightSpec, LightingKeys, LightingPlan, SkySpec};
+use super::lighting::{self, DepthCueSpec, LightAsked, LightFound, LightSpec, LightingKeys, LightingPlan, SkySpec};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::scene::ScenePlan;
+use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
 use super::subject::scene_and_occlusion;
 use super::write::{Content, PictureFiles, WritePlan};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::geometry::Dimension;
+use crate::io;
 use crate::occlusion::Estimator;
+use crate::progress::Progress;
 use crate::render::filters::denoise::Refine;
 use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Accuracy, Aov, Columns, MOST_SAMPLES, NOTHING, Renderer};
+use crate::render::{self, Accuracy, Aov, Columns, MOST_LAYERS, MOST_SAMPLES, NOTHING, Renderer, Skylight};
 use crate::text::number;
 use crate::trace::Sampling;
+use crate::volume::Grid;
 
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
@@ -50,8 +54,11 @@ pub struct RenderSpec {
     pub id: Option<String>,
     /// The scene, or the occlusion (and with it its scene), by its id.
     pub input: Option<String>,
-    /// The occlusion that darkens the image, by its id; `none` renders without (default: the nearest earlier one, if any).
+    /// The occlusion that darkens the image, by its id; `none` renders without; `screen_space` looks for it in the image
+    /// itself, without rays (default: the nearest earlier one, if any).
     pub occlusion: Option<String>,
+    /// With `occlusion: screen_space`: how it is looked for.
+    pub screen_space: Option<ScreenSpaceSpec>,
     /// Where it is seen from.
     pub camera: Option<CameraSpec>,
     /// Voxels along x, y and z; in 3D pixels along x and y.
@@ -68,6 +75,10 @@ pub struct RenderSpec {
     /// (default 3; 1 with `lights`, where each sample looks for shadows of its own, and from 270^3 voxels on).
     #[schemars(range(min = 1, max = 8))]
     pub supersample: Option<u64>,
+    /// Of every voxel also the surfaces behind the first that the ray through its centre passes: so many layers, front to back, in
+    /// arrays whose names end in the layer's number (`layer_depth` and others of `write.arrays`).
+    #[schemars(range(min = 1, max = 1000))]
+    pub layers: Option<u64>,
     /// Layers of empty voxels around bodies that take over the bodies' colour and occlusion, so that contours and volume
     /// renderings mix in nothing else; opacity tells what is real (default 3 in 4D, 0 in 3D).
     #[schemars(range(min = 0, max = 16))]
@@ -118,8 +129,10 @@ pub enum Shading {
 pub struct RenderPlan {
     /// The scene it shows.
     pub scene: Ref<ScenePlan>,
-    /// The occlusion that darkens it; none renders without.
+    /// The occlusion that darkens it; none renders without, or looks for it in the image.
     pub occlusion: Option<Ref<OcclusionPlan>>,
+    /// How occlusion is looked for in the image itself, if it is.
+    pub screen_space: Option<ScreenSpacePlan>,
     /// Where it is seen from.
     pub camera: CameraPlan,
     /// Voxels along x, y and z; one layer in 3D.
@@ -132,6 +145,8 @@ pub struct RenderPlan {
     pub tolerance: Option<f64>,
     /// Samples of a voxel along each axis.
     pub supersample: usize,
+    /// Layers of surfaces that arrays are made of; 0 for none.
+    pub layers: usize,
     /// Layers of empty voxels that take over bodies' values.
     pub dilate: usize,
     /// How it is lit; none shows colour times occlusion.
@@ -158,17 +173,27 @@ impl RenderSpec {
 }
 
 impl RenderPlan {
-    /// What light from the sky and from other surfaces its files need.
-    fn light_asked(&self) -> LightAsked<'_> {
+    /// Whether anything darkens it.
+    pub fn is_dark(&self) -> bool {
+        self.occlusion.is_some() || self.screen_space.is_some()
+    }
+
+    /// What light from the sky and from other surfaces these arrays of it need.
+    pub(super) fn light_asked(&self, arrays: &[Aov]) -> LightAsked<'_> {
         let lighting = self.lighting.as_ref();
-        let is_lit = self.arrays.iter().any(|aov| aov.is_lit() || *aov == Aov::Irradiance);
+        let is_lit = arrays.iter().any(|aov| aov.is_lit() || *aov == Aov::Irradiance);
         let is_bounce = |aov: &Aov| matches!(aov, Aov::Bounce | Aov::BounceError);
         LightAsked {
             lighting,
-            directions: self.arrays.contains(&Aov::BentNormal) || is_lit && lighting.is_some_and(|l| l.sky.is_some()),
-            bounce: lighting.is_some_and(|l| l.bounce) && (is_lit || self.arrays.iter().any(is_bounce)),
+            directions: arrays.contains(&Aov::BentNormal) || is_lit && lighting.is_some_and(|l| l.sky.is_some()),
+            bounce: lighting.is_some_and(|l| l.bounce) && (is_lit || arrays.iter().any(is_bounce)),
             at_voxels: self.shading == Shading::Voxel,
         }
+    }
+
+    /// Why nothing is known of the directions in which the sky is open, if so.
+    pub(super) fn no_directions(&self, plan: &Plan) -> Option<String> {
+        no_directions(plan, self.scene, self.occlusion, self.screen_space.is_some())
     }
 
     /// The number of voxels.
@@ -193,15 +218,16 @@ impl Stage for RenderPlan {
     }
 
     fn resolve(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
-        let (input, named) = (spec.input.as_deref(), spec.occlusion.as_deref());
-        let (scene, occlusion) = scene_and_occlusion(resolver, path, input, named)?;
+        let screen_space = screen_space(spec, path, resolver)?;
+        let named = spec.occlusion.as_deref().map(|word| if screen_space.is_some() { "none" } else { word });
+        let (scene, occlusion) = scene_and_occlusion(resolver, path, spec.input.as_deref(), named)?;
         let dimension = resolver.plan[scene].dimension;
         let blank = CameraSpec::default();
         let camera_spec = spec.camera.as_ref().unwrap_or(&blank);
         let warnings = &mut resolver.plan.warnings;
         let camera = camera::plan(camera_spec, &format!("{path}.camera"), dimension, warnings)?;
         let default = occlusion.map_or(Shading::Smooth, |o| resolver.plan[o].default_shading());
-        let shading = spec.shading.unwrap_or(default);
+        let shading = spec.shading.filter(|_| screen_space.is_none()).unwrap_or(default);
         let refusal = match occlusion.map(|o| &resolver.plan[o].source).filter(|_| shading == Shading::Voxel) {
             Some(OcclusionSource::Load(_)) => Some(
                 "`voxel` computes occlusion at the visible points, which a loaded file has no values for".to_owned(),
@@ -252,17 +278,14 @@ impl Stage for RenderPlan {
                 format!("with {supersample} samples along each axis an image has at most {MAX_DIMENSION} of them");
             return Err(Invalid::new(format!("{path}.supersample"), message));
         }
-        let layers = if dimension == Dimension::Four { 3 } else { 0 };
-        let dilate = within("dilate", spec.dilate, layers, 0, MAX_DILATION)?;
+        let layers = within("layers", spec.layers, 0, 1, MOST_LAYERS)?;
+        let halo = if dimension == Dimension::Four { 3 } else { 0 };
+        let dilate = within("dilate", spec.dilate, halo, 0, MAX_DILATION)?;
         let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
         for (key, given) in [("sky", spec.sky.is_some()), ("bounce", lighting.as_ref().is_some_and(|l| l.bounce))] {
-            let refusal = occlusion.map_or_else(
-                || {
-                    (key == "bounce")
-                        .then(|| "needs an occlusion, which tells how much light reaches a surface".to_owned())
-                },
-                |occlusion| resolver.plan[occlusion].no_directions(),
-            );
+            let needed = "needs an occlusion, which tells how much light reaches a surface";
+            let lacks = || (key == "bounce" && occlusion.is_none()).then(|| needed.to_owned());
+            let refusal = no_directions(&resolver.plan, scene, occlusion, screen_space.is_some()).or_else(lacks);
             if let Some(message) = refusal.filter(|_| given) {
                 return Err(Invalid::new(format!("{path}.{key}"), message));
             }
@@ -272,12 +295,14 @@ impl Stage for RenderPlan {
         Ok(Self {
             scene,
             occlusion,
+            screen_space,
             camera,
             dimensions,
             shading,
             denoise,
             tolerance,
             supersample,
+            layers,
             dilate,
             lighting,
             visibility,
@@ -286,8 +311,13 @@ impl Stage for RenderPlan {
     }
 
     fn unused(me: Ref<Self>, plan: &Plan) -> Option<&'static str> {
-        let written = plan.all::<WritePlan>().any(|(_, write)| write.render == me);
-        (!written).then_some("no `write` stage writes this image")
+        let written = (0..plan.stages.len()).any(|stage| plan.works_on(stage).contains(&me.index()));
+        let layers = plan[me].layers == 0 || plan[me].arrays.iter().any(|aov| aov.needs_layers());
+        match (written, layers) {
+            (false, _) => Some("no `write` stage writes this image"),
+            (true, false) => Some("no `write` stage writes its `layers`; add `layer_depth` or others to its `arrays`"),
+            (true, true) => None,
+        }
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -302,12 +332,18 @@ impl Stage for RenderPlan {
         let render = &plan[me];
         let mut written = json!({
             "camera": render.camera.written(),
-            "shading": render.shading,
             "supersample": render.supersample,
             "dilate": render.dilate,
         });
+        match &render.screen_space {
+            Some(screen_space) => written["screen_space"] = screen_space.written(),
+            None => written["shading"] = json!(render.shading),
+        }
         if let (Some(lighting), Some(written)) = (&render.lighting, written.as_object_mut()) {
             written.extend(lighting.written());
+        }
+        if render.layers > 0 {
+            written["layers"] = render.layers.into();
         }
         // Elsewhere it has no effect, and would be warned of.
         if rays_of(plan, render).is_some() {
@@ -324,29 +360,7 @@ impl Stage for RenderPlan {
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == me) {
             aovs.extend(write.stale(Content::Voxels, stale).into_iter().flat_map(|file| file.format.arrays(write)));
         }
-        if aovs.is_empty() {
-            return Needs::default();
-        }
-        let dimension = plan[render.scene].dimension;
-        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension)).sum();
-        let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
-        if let Some(lighting) = &render.lighting {
-            columns |= Columns::DIRECT;
-            if lighting.sky.is_some() || lighting.bounce {
-                columns |= Columns::IRRADIANCE | Columns::DIRECTION | Columns::HIDDEN;
-            }
-        }
-        let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
-        if render.denoise {
-            columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
-            columns |= Columns::FITTED | Columns::MISFIT | Columns::ERROR;
-            halo += 10;
-        }
-        let samples = (render.supersample.pow(axes) * size_of::<u32>()) as u64;
-        // Filters keep the layers that they look at.
-        let layers = if axes == 3 { (1 + halo).min(render.dimensions[2] as u64) } else { 1 };
-        let voxel = samples + layers * columns.bytes::<4>() as u64 + arrays;
-        Needs { memory: (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel), disk: 0 }
+        if aovs.is_empty() { Needs::default() } else { render.memory(plan, &aovs) }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
@@ -354,8 +368,10 @@ impl Stage for RenderPlan {
         let [x, y, z] = render.dimensions;
         let with = match render.occlusion {
             Some(occlusion) => format!("with {}", plan.id(occlusion)),
+            None if render.screen_space.is_some() => "with occlusion in screen space".into(),
             None => "without occlusion".into(),
         };
+        let shading = render.screen_space.map_or(render.shading.as_str().to_owned(), |space| space.line());
         let projection = match render.camera.projection {
             ProjectionPlan::Perspective { field_of_view } => format!("perspective {field_of_view} degrees"),
             ProjectionPlan::Parallel { height } => format!("parallel, height {height}"),
@@ -365,7 +381,7 @@ impl Stage for RenderPlan {
             Dimension::Four => format!("{x} x {y} x {z}"),
         };
         let (scene, voxels) = (plan.id(render.scene), grouped(render.voxels()));
-        format!("{scene} {with}: {extent} = {voxels} voxels, {}, {projection}", render.shading.as_str())
+        format!("{scene} {with}: {extent} = {voxels} voxels, {shading}, {projection}")
     }
 
     fn totals(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> Totals {
@@ -382,22 +398,106 @@ impl Stage for RenderPlan {
         if let Some(occlusion) = render.occlusion.filter(|_| render.shading != Shading::Voxel) {
             occlusion::values(occlusion, run, scene)?;
         }
-        let skylight = scene.skylight(render.occlusion, render.light_asked(), run)?;
+        let skylight = scene.skylight(render.occlusion, render.light_asked(&render.arrays), run)?;
+        let name = format!("render {}", plan.id(me));
+        let made = render.picture(&name, plan, scene, skylight, run.progress, |grid, hash| {
+            PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), grid, hash)
+        })?;
+        let mut notes: Vec<String> =
+            made.nothing.iter().map(|why| format!("{name} shows background only: {why}")).collect();
+        notes.extend(made.in_vain.iter().map(|told| format!("{name}: {told}")));
+        if let Some(light) = &made.light {
+            let rays = format!("{} of the {} rays", grouped(light.behind), grouped(light.hits));
+            notes.extend(light.notes(&rays).iter().map(|told| format!("{name}: {told}")));
+        }
+        if made.behind > 0 {
+            notes.push(format!(
+                "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
+                 turn that object by `orientation: eye`, or take `shading: voxel`",
+                plan.id(me),
+                grouped(made.behind),
+                grouped(made.seen)
+            ));
+        }
+        for (file, bytes) in made.files {
+            run.made(&file, bytes, notes.clone())?;
+        }
+        let rate = render.voxels() as f64 / made.rendering.as_secs_f64() / 1e6;
+        let off = made.accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
+            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
+        });
+        Ok(format!(
+            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
+            grouped(made.seen),
+            grouped(render.voxels())
+        ))
+    }
+}
+
+impl RenderPlan {
+    /// The memory of a slab of one layer with these arrays.
+    pub(super) fn memory(&self, plan: &Plan, aovs: &BTreeSet<Aov>) -> Needs {
+        let render = self;
+        let dimension = plan[render.scene].dimension;
+        let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension, render.layers)).sum();
+        let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
+        if let Some(lighting) = &render.lighting {
+            columns |= Columns::DIRECT;
+            if lighting.sky.is_some() || lighting.bounce {
+                columns |= Columns::IRRADIANCE | Columns::DIRECTION | Columns::HIDDEN;
+            }
+        }
+        if plan[render.scene].is_translucent() {
+            columns |= Columns::BEHIND | Columns::THROUGH;
+        }
+        let (mut halo, axes) = (2 * render.dilate as u64, dimension.get() as u32 - 1);
+        let (mut whole, mut holds) = (0, "one layer of its picture");
+        if render.screen_space.is_some() {
+            columns |= Columns::POSITION | Columns::NORMAL | Columns::OCCLUSION;
+            (whole, holds) = (size_of::<f32>() as u64, "one layer of its picture and the depth of all of it");
+        }
+        if render.denoise {
+            columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
+            columns |= Columns::FITTED | Columns::MISFIT | Columns::ERROR;
+            halo += 10;
+        }
+        let samples = (render.supersample.pow(axes) * size_of::<u32>()) as u64;
+        // Filters keep the layers that they look at.
+        let layers = if axes == 3 { (1 + halo).min(render.dimensions[2] as u64) } else { 1 };
+        let voxel = samples + layers * columns.bytes::<4>() as u64 + arrays;
+        let memory = (render.voxels() / render.dimensions[2] as u64).saturating_mul(voxel);
+        Needs { memory: memory.saturating_add(render.voxels().saturating_mul(whole)), disk: 0, holds }
+    }
+
+    /// Makes the picture, and the files that `open` opens for it; `name` is what it is called where progress is told.
+    /// Values at vertices must be known where they are shown, and the light of the sky and of other surfaces found.
+    pub(super) fn picture<const D: usize>(
+        &self,
+        name: &str,
+        plan: &Plan,
+        scene: &SceneRun<D>,
+        skylight: Option<Arc<Skylight<D>>>,
+        progress: &dyn Progress,
+        open: impl FnOnce(&Grid, &str) -> Result<PictureFiles, io::Error>,
+    ) -> Result<Picture, StageError> {
+        let render = self;
         let shading = shading(plan, render, scene);
         let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
+        picture.layers = render.layers;
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
         picture.skylight = skylight;
         picture.filters = filters(plan, render, &picture);
-        picture.audit = render.occlusion.and_then(|occlusion| plan[occlusion].audit());
+        picture.audit = render.audit(plan);
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
-        let mut files = PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), &picture.grid, hash)?;
+        let mut files = open(&picture.grid, hash)?;
         let aovs = files.aovs().to_vec();
         let (mut seen, mut behind) = (0, 0);
-        // Two passes over the voxels: what is seen, and its shade.
-        let running = run.progress.stage(&format!("render {}", plan.id(me)), 2 * render.voxels());
-        let accuracy = picture.render(&aovs, None, run.progress, |slab| -> Result<(), StageError> {
+        // Two passes over the voxels: what is seen, and its shade; and, where that takes longest, another in the image.
+        let passes = 2 + u64::from(render.screen_space.is_some());
+        let running = progress.stage(name, passes * render.voxels());
+        let accuracy = picture.render(&aovs, None, progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;
             behind += slab.behind;
             Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
@@ -408,35 +508,62 @@ impl Stage for RenderPlan {
         }
         let rendering = start.elapsed();
         let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
-        let mut notes: Vec<String> = nothing.then(|| nothing_seen(&picture, plan.id(me))).into_iter().collect();
-        if let Some(lighting) = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit())) {
-            notes.extend(lighting::in_vain(lighting, plan.id(me)));
-        }
-        if let Some(skylight) = &picture.skylight {
-            notes.extend(lighting::light_notes(skylight, &scene.session, plan.id(me)));
-        }
-        if behind > 0 && picture.shading.is_interpolated() {
-            notes.push(format!(
-                "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
-                 turn that object by `orientation: eye`, or take `shading: voxel`",
-                plan.id(me),
-                grouped(behind),
-                grouped(seen)
-            ));
-        }
-        for (file, bytes) in files.finish()? {
-            run.made(&file, bytes, notes.clone())?;
-        }
-        let rate = render.voxels() as f64 / rendering.as_secs_f64() / 1e6;
-        let off = accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
-            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
-        });
-        Ok(format!(
-            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
-            grouped(seen),
-            grouped(render.voxels())
-        ))
+        let lit = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit()));
+        Ok(Picture {
+            voxels: render.voxels(),
+            seen,
+            behind: if picture.shading.is_interpolated() { behind } else { 0 },
+            accuracy,
+            nothing: nothing.then(|| nothing_seen(&picture)),
+            in_vain: lit.map_or_else(Vec::new, lighting::in_vain),
+            light: picture.skylight.as_deref().map(|light| LightFound::new(light, &scene.session)),
+            rendering,
+            files: files.finish()?,
+        })
     }
+}
+
+/// Why nothing is known of the directions in which the sky is open, if so.
+fn no_directions(
+    plan: &Plan,
+    scene: Ref<ScenePlan>,
+    occlusion: Option<Ref<OcclusionPlan>>,
+    in_screen_space: bool,
+) -> Option<String> {
+    if in_screen_space {
+        let message = "`screen_space` tells how much of the sky is hidden, not where it is open; take the occlusion of an \
+                       `occlusion` stage";
+        return Some(message.to_owned());
+    }
+    if let Some(name) = plan[scene].translucent() {
+        return Some(format!(
+            "{name} lets light through, and where the sky is open is found among opaque objects only; leave out `opacity` \
+             there"
+        ));
+    }
+    occlusion.and_then(|occlusion| plan[occlusion].no_directions())
+}
+
+/// What came of a picture.
+pub(super) struct Picture {
+    /// How many voxels it has.
+    pub voxels: u64,
+    /// How many voxels see something.
+    pub seen: u64,
+    /// How many of them see a surface from behind, with the occlusion of its front.
+    pub behind: u64,
+    /// How far off it is.
+    pub accuracy: Option<Accuracy>,
+    /// Why it shows nothing, if it does though there is something.
+    pub nothing: Option<String>,
+    /// What its lights do in vain.
+    pub in_vain: Vec<String>,
+    /// What was found of the light of the sky and of other surfaces, if it has any.
+    pub light: Option<LightFound>,
+    /// How long it took.
+    pub rendering: Duration,
+    /// Its files, with their lengths.
+    pub files: Vec<(PathBuf, u64)>,
 }
 
 /// Whether some file has to be made that holds voxels of a render.
@@ -445,25 +572,28 @@ pub(super) fn is_stale(me: Ref<RenderPlan>, plan: &Plan, stale: &dyn Fn(&Path) -
     writes.any(|(_, write)| !write.stale(Content::Voxels, stale).is_empty())
 }
 
-/// Bytes that a voxel takes in this array.
-pub(super) fn array_bytes(aov: Aov, dimension: Dimension) -> u64 {
+/// Bytes that a voxel takes in this array, or in those of so many layers.
+pub(super) fn array_bytes(aov: Aov, dimension: Dimension, layers: usize) -> u64 {
     let bytes = match dimension {
         Dimension::Three => aov.bytes::<3>(),
         Dimension::Four => aov.bytes::<4>(),
     };
-    bytes as u64
+    (bytes * aov.count(layers)) as u64
 }
 
 /// Marks the vertices of the simplices that a render shows, unless that costs more than is `left` to spend on it.
 /// Returns whether it did.
 pub(super) fn mark_seen<const D: usize>(
-    me: Ref<RenderPlan>,
+    (name, render): (&str, &RenderPlan),
     run: &Run,
     scene: &SceneRun<D>,
     left: &mut u64,
     mask: &mut [bool],
 ) -> Result<bool, StageError> {
-    let render = &run.plan[me];
+    // What is behind the first surfaces needs values too.
+    if run.plan[render.scene].is_translucent() || render.arrays.contains(&Aov::LayerAmbientOcclusion) {
+        return Ok(false);
+    }
     let camera = camera::camera(&render.camera)?;
     // All samples, not the voxels' centres alone.
     let samples = |a: usize| if a < D - 1 { render.dimensions[a] * render.supersample } else { 1 };
@@ -474,7 +604,7 @@ pub(super) fn mark_seen<const D: usize>(
     if *left == 0 {
         return Ok(false);
     }
-    let _running = run.progress.stage(&format!("what {} shows", run.plan.id(me)), render.voxels());
+    let _running = run.progress.stage(&format!("what {name} shows"), render.voxels());
     let thick = (SLAB_BYTES / size_of::<u32>() / grid.layer_len()).clamp(1, grid.dimensions[2]);
     for first in (0..grid.dimensions[2]).step_by(thick) {
         let layers = first..grid.dimensions[2].min(first + thick);
@@ -490,6 +620,9 @@ pub(super) fn mark_seen<const D: usize>(
 }
 
 fn shading<const D: usize>(plan: &Plan, render: &RenderPlan, scene: &SceneRun<D>) -> render::Shading {
+    if let Some(screen_space) = &render.screen_space {
+        return render::Shading::ScreenSpace(screen_space.settings());
+    }
     let Some(occlusion) = render.occlusion else { return render::Shading::None };
     match (render.shading, &plan[occlusion].source) {
         (Shading::Voxel, OcclusionSource::Compute(computation)) => render::Shading::Voxel(computation.estimator()),
@@ -518,6 +651,21 @@ fn rays(occlusion: &OcclusionPlan, shading: Shading, dimension: Dimension, toler
 fn rays_of(plan: &Plan, render: &RenderPlan) -> Option<Sampling> {
     let tolerance = render.tolerance.unwrap_or(TOLERANCE);
     rays(&plan[render.occlusion?], render.shading, plan[render.scene].dimension, tolerance)
+}
+
+/// How occlusion is looked for in the image itself, if it is.
+fn screen_space(spec: &RenderSpec, path: &str, resolver: &mut Resolver) -> Result<Option<ScreenSpacePlan>, Invalid> {
+    let plan = screen_space::plan(spec.screen_space.as_ref(), &format!("{path}.{}", screen_space::WORD))?;
+    if spec.occlusion.as_deref() != Some(screen_space::WORD) {
+        if spec.screen_space.is_some() {
+            resolver.warn(format!("{path}.screen_space"), "has no effect without `occlusion: screen_space`");
+        }
+        return Ok(None);
+    }
+    if spec.shading.is_some() {
+        resolver.warn(format!("{path}.shading"), "has no effect with `occlusion: screen_space`");
+    }
+    Ok(Some(plan))
 }
 
 /// The standard error that a voxel may have.
@@ -551,14 +699,14 @@ fn short(error: f64) -> String {
 }
 
 /// Why a picture shows nothing.
-fn nothing_seen<const D: usize>(picture: &Renderer<D>, id: &str) -> String {
+fn nothing_seen<const D: usize>(picture: &Renderer<D>) -> String {
     let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
-    let why = if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
+    if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
         "the scene lies wholly behind the camera; turn the camera, or move it back"
     } else {
         "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"
-    };
-    format!("render {id} shows background only: {why}")
+    }
+    .to_owned()
 }
 
 impl Shading {
@@ -670,10 +818,11 @@ stages:
         let (renders, figures): (Vec<_>, Vec<_>) =
             (plan.all::<RenderPlan>().collect(), plan.all::<FigurePlan>().map(|(_, figure)| figure).collect());
         let scenes: Vec<_> = plan.all::<ScenePlan>().map(|(_, scene)| scene).collect();
-        let nth = |figure: &FigurePlan| -> Vec<usize> { figure.writes.iter().map(|write| write.nth()).collect() };
+        // As JSON a write is its number.
+        let nth = |figure: &FigurePlan| serde_json::to_value(&figure.writes).unwrap();
         let arrays: Vec<&str> = renders[0].1.arrays.iter().map(|array| array.name()).collect();
         assert_eq!(arrays, ["rgba", "opacity", "rgb", "normal"]);
-        assert_eq!((nth(figures[0]), nth(figures[1])), (vec![1], vec![0, 0]));
+        assert_eq!((nth(figures[0]), nth(figures[1])), (json!([1]), json!([0, 0])));
         assert_eq!(scenes[0].eye, Some(vec![0.0, 0.0, 0.0, 2.0]), "the first render's");
         assert_eq!(scenes[1].eye, None);
         assert_eq!(plan.all::<WritePlan>().map(|(write, _)| plan.id(write)).collect::<Vec<_>>(), ["write", "write-2"]);

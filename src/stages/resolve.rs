@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::names::{Outputs, unfit_name};
-use super::{Invalid, Plan, Planned, Ref, Stage, StageSpec, suggest};
+use super::{Invalid, Plan, Planned, Ref, Stage, StagePlan, StageSpec, suggest};
 
 /// Words that stand for the pipeline's own keys where a stage is named, and for no occlusion.
-const RESERVED: [&str; 4] = ["name", "seed", "stages", "none"];
+const RESERVED: [&str; 5] = ["name", "seed", "stages", "none", super::screen_space::WORD];
 
 /// A plan that grows stage by stage, with what is needed to resolve the next one.
 pub struct Resolver {
@@ -48,7 +48,7 @@ impl Plan {
             resolver.stage(format!("stages[{i}].{}", stage.kind()), stage)?;
         }
         let Resolver { mut plan, .. } = resolver;
-        for index in 0..plan.stages.len() {
+        for index in (0..plan.stages.len()).filter(|&index| !plan.is_twin(index)).collect::<Vec<_>>() {
             if let Some(message) = plan.unused(index) {
                 plan.warnings.push(Invalid::new(&plan.stages[index].path, message));
             }
@@ -82,11 +82,34 @@ impl Resolver {
     fn stage(&mut self, path: String, stage: &StageSpec) -> Result<(), Invalid> {
         let id = self.name_for(stage);
         let plan = stage.resolve(&path, self)?;
+        self.twin(&id, &path, stage, &plan)?;
         if let Some(id) = stage.id() {
             self.ids.insert(id.to_owned(), self.plan.stages.len());
         }
-        self.plan.stages.push(Planned { id, path, plan });
+        self.plan.stages.push(Planned { id, path, plan, twin: false });
         Ok(())
+    }
+
+    /// Puts a stage's twin before it, if it has one.
+    fn twin(&mut self, id: &str, path: &str, stage: &StageSpec, plan: &StagePlan) -> Result<(), Invalid> {
+        let twin_of = |index| Some(self.plan.stages[self.twin_of(index)?].id.clone());
+        let Some((id, twin)) = stage.twin(id, plan, path, twin_of)? else { return Ok(()) };
+        if self.all_ids.contains(&id) || self.ids.contains_key(&id) {
+            let message = format!("the stage's twin would be called `{id}`, as another is; give that another id");
+            return Err(Invalid::new(path, message));
+        }
+        // What is to be said of the stage was said of itself.
+        let warnings = self.plan.warnings.len();
+        let plan = twin.resolve(path, self)?;
+        self.plan.warnings.truncate(warnings);
+        self.ids.insert(id.clone(), self.plan.stages.len());
+        self.plan.stages.push(Planned { id, path: path.to_owned(), plan, twin: true });
+        Ok(())
+    }
+
+    /// The place of the twin of the stage at a place, if it has one.
+    pub(super) fn twin_of(&self, index: usize) -> Option<usize> {
+        index.checked_sub(1).filter(|&before| self.plan.is_twin(before))
     }
 
     /// The stage's id, or one made up from its kind: `render`, `render-2`, ...
@@ -95,7 +118,8 @@ impl Resolver {
             return id.to_owned();
         }
         let kind = stage.kind();
-        let earlier = (0..self.plan.stages.len()).filter(|&index| self.plan.kind(index) == kind).count();
+        let own = |&index: &usize| self.plan.kind(index) == kind && !self.plan.is_twin(index);
+        let earlier = (0..self.plan.stages.len()).filter(own).count();
         let numbered = |n: usize| if n == 1 { kind.to_owned() } else { format!("{kind}-{n}") };
         (earlier + 1..).map(numbered).find(|name| !self.all_ids.contains(name)).unwrap_or_default()
     }

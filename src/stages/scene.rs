@@ -14,9 +14,9 @@ use super::describe::{Counts, grouped};
 use super::render::RenderPlan;
 use super::{Invalid, LeftOut, Plan, Ref, Resolver, Stage};
 use crate::geometry::Dimension;
-use crate::mesh::{Mesh, MeshBuilder, Orientation};
+use crate::mesh::{Mesh, MeshBuilder, Orientation, Surface};
 use crate::progress::Progress;
-use crate::scene::{self, ObjectSpec, build_object_watched};
+use crate::scene::{self, ObjectSpec, TransformStep, build_object_watched};
 
 /// The most objects in a scene: the `object` array numbers them with 16 bits, and 0 is the background.
 pub const MAX_OBJECTS: usize = 65_535;
@@ -32,6 +32,8 @@ pub struct SceneSpec {
     /// 4 (default), or 3 for triangles in ordinary space.
     #[schemars(range(min = 3, max = 4))]
     pub dimension: Option<u64>,
+    /// Whether its twin in 3D stands beside it, made and shown by whatever works on the scene (default `false`).
+    pub twin: Option<bool>,
     /// The objects. Where two are hit at the same distance, one that faces the eye wins, else the first.
     pub objects: Vec<ObjectSpec>,
 }
@@ -45,6 +47,19 @@ pub struct ScenePlan {
     pub objects: Vec<ObjectSpec>,
     /// The eye of the first render of this scene, for open objects that are to face it.
     pub eye: Option<Vec<f64>>,
+}
+
+impl ScenePlan {
+    /// Whether light passes some object.
+    pub fn is_translucent(&self) -> bool {
+        self.translucent().is_some()
+    }
+
+    /// What the first object that light passes is called, if there is one.
+    pub(super) fn translucent(&self) -> Option<String> {
+        let at = self.objects.iter().position(|object| object.opacity.is_some_and(|opacity| opacity < 1.0))?;
+        Some(self.objects[at].name.clone().unwrap_or_else(|| format!("object {}", at + 1)))
+    }
 }
 
 impl Stage for ScenePlan {
@@ -170,40 +185,112 @@ pub fn build<const D: usize>(
 ) -> Result<Mesh<D>, Invalid> {
     let (path, id) = (plan.path(scene), plan.id(scene));
     let mut builder = MeshBuilder::<D>::new();
-    for (i, object) in plan[scene].objects.iter().enumerate() {
-        let here = format!("{path}.objects[{i}]");
-        let refuse = |key: &str, message: String| {
-            Invalid::new(if key.is_empty() { here.clone() } else { format!("{here}.{key}") }, message)
-        };
-        // The path names the key already.
-        let blame = |error: scene::Error| {
-            let (key, message) = (error.key(), error.to_string());
-            refuse(key, message.strip_prefix(&format!("{key}: ")).unwrap_or(&message).to_owned())
-        };
-        let name = object.name.clone().unwrap_or_else(|| format!("object {}", i + 1));
-        let mut told = Vec::new();
-        let surface = build_object_watched::<D>(object, &plan.folder, &mut told, progress).map_err(blame)?;
-        notes.extend(told.into_iter().map(|note| format!("scene {id}, {name}: {note}")));
-        let open = match object.orientation {
-            scene::Orientation::Input => Orientation::Input,
-            scene::Orientation::Eye => match first_render(plan, scene) {
-                Some(render) => {
-                    let camera = camera::<D>(&render.camera).map_err(|e| refuse("orientation", e.to_string()))?;
-                    Orientation::Facing(camera.viewpoint())
-                }
-                None => {
-                    let message = "`eye` faces the camera of the first render of this scene, and there is none";
-                    return Err(refuse("orientation", message.to_owned()));
-                }
-            },
-        };
-        let color = object.color.rgb().map_err(blame)?;
-        let crease = object.crease().map_err(blame)?;
-        builder.add_creased(&name, color, &surface, open, crease).map_err(|e| refuse("", e.to_string()))?;
+    for i in 0..plan[scene].objects.len() {
+        let surface = surface(plan, scene, i, notes, progress)?;
+        add(&mut builder, plan, scene, i, &surface)?;
     }
     let mesh = builder.finish_watched(progress).ok_or_else(|| Invalid::new(path, "stopped"))?;
     notes.extend(worth_telling(&mesh).into_iter().map(|note| format!("scene {id}: {note}")));
     Ok(mesh)
+}
+
+/// What every object is called in messages and files.
+fn name_of(object: &ObjectSpec, i: usize) -> String {
+    object.name.clone().unwrap_or_else(|| format!("object {}", i + 1))
+}
+
+/// The complaint about a key of an object.
+fn blame(plan: &Plan, scene: Ref<ScenePlan>, i: usize, error: &scene::Error) -> Invalid {
+    let (key, message) = (error.key(), error.to_string());
+    let here = format!("{}.objects[{i}]", plan.path(scene));
+    // The path names the key already.
+    let message = message.strip_prefix(&format!("{key}: ")).unwrap_or(&message).to_owned();
+    Invalid::new(if key.is_empty() { here } else { format!("{here}.{key}") }, message)
+}
+
+/// The surface of an object, in its place.
+fn surface<const D: usize>(
+    plan: &Plan,
+    scene: Ref<ScenePlan>,
+    i: usize,
+    notes: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Surface<D>, Invalid> {
+    let (object, mut told) = (&plan[scene].objects[i], Vec::new());
+    let surface = build_object_watched::<D>(object, &plan.folder, &mut told, progress);
+    let surface = surface.map_err(|e| blame(plan, scene, i, &e))?;
+    let (id, name) = (plan.id(scene), name_of(object, i));
+    notes.extend(told.into_iter().map(|note| format!("scene {id}, {name}: {note}")));
+    Ok(surface)
+}
+
+/// Puts an object's surface into a mesh.
+fn add<const D: usize>(
+    builder: &mut MeshBuilder<D>,
+    plan: &Plan,
+    scene: Ref<ScenePlan>,
+    i: usize,
+    surface: &Surface<D>,
+) -> Result<(), Invalid> {
+    let object = &plan[scene].objects[i];
+    let here = format!("{}.objects[{i}]", plan.path(scene));
+    let refuse = |message: String| Invalid::new(format!("{here}.orientation"), message);
+    let open = match object.orientation {
+        scene::Orientation::Input => Orientation::Input,
+        scene::Orientation::Eye => match first_render(plan, scene) {
+            Some(render) => {
+                let camera = camera::<D>(&render.camera).map_err(|e| refuse(e.to_string()))?;
+                Orientation::Facing(camera.viewpoint())
+            }
+            None => {
+                let message = "`eye` faces the camera of the first render of this scene, and there is none";
+                return Err(refuse(message.to_owned()));
+            }
+        },
+    };
+    let color = object.color.rgb().map_err(|e| blame(plan, scene, i, &e))?;
+    let crease = object.crease().map_err(|e| blame(plan, scene, i, &e))?;
+    let name = name_of(object, i);
+    let opacity = object.surface_opacity().map_err(|e| blame(plan, scene, i, &e))?;
+    builder.add_creased(&name, color, surface, open, crease).map_err(|e| Invalid::new(here.clone(), e.to_string()))?;
+    builder.set_opacity(opacity);
+    Ok(())
+}
+
+/// The surfaces of a scene's objects, kept so that some of them can be moved without building them again.
+pub(super) struct Bodies<const D: usize> {
+    scene: Ref<ScenePlan>,
+    surfaces: Vec<Surface<D>>,
+}
+
+impl<const D: usize> Bodies<D> {
+    /// Builds them.
+    pub fn build(plan: &Plan, scene: Ref<ScenePlan>, progress: &dyn Progress) -> Result<Self, Invalid> {
+        let objects = 0..plan[scene].objects.len();
+        // What there is to tell of them was told when the scene was built.
+        let surfaces: Result<_, _> = objects.map(|i| surface(plan, scene, i, &mut Vec::new(), progress)).collect();
+        Ok(Self { scene, surfaces: surfaces? })
+    }
+
+    /// The scene with these objects moved on by these steps; the same as if the steps stood at the end of their `transform`.
+    pub fn moved(
+        &self,
+        plan: &Plan,
+        objects: &[usize],
+        steps: &[TransformStep],
+        progress: &dyn Progress,
+    ) -> Result<Mesh<D>, Invalid> {
+        let mut builder = MeshBuilder::<D>::new();
+        for (i, surface) in self.surfaces.iter().enumerate() {
+            if objects.contains(&i) {
+                let surface = scene::moved(surface, steps).map_err(|e| blame(plan, self.scene, i, &e))?;
+                add(&mut builder, plan, self.scene, i, &surface)?;
+            } else {
+                add(&mut builder, plan, self.scene, i, surface)?;
+            }
+        }
+        builder.finish_watched(progress).ok_or_else(|| Invalid::new(plan.path(self.scene), "stopped"))
+    }
 }
 
 /// Simplices that nothing hits, that rounding turned over, or that lie on others.

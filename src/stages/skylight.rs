@@ -37,15 +37,15 @@ impl<const D: usize> SceneRun<D> {
         occlusion: Option<Ref<OcclusionPlan>>,
         asked: LightAsked,
         run: &Run,
-    ) -> Result<Option<Skylight<D>>, StageError> {
+    ) -> Result<Option<Arc<Skylight<D>>>, StageError> {
         if !asked.directions && !asked.bounce {
             return Ok(None);
         }
         let gradient = asked.lighting.map_or_else(Vector64::zeros, LightingPlan::gradient);
         let mut light = Skylight::new(gradient);
-        let Some(of) = occlusion else { return Ok(Some(light)) };
+        let Some(of) = occlusion else { return Ok(Some(Arc::new(light))) };
         if asked.at_voxels && !asked.bounce {
-            return Ok(Some(light));
+            return Ok(Some(Arc::new(light)));
         }
         let found = self.directions(of, run)?;
         if asked.bounce {
@@ -59,7 +59,7 @@ impl<const D: usize> SceneRun<D> {
             }
         }
         light.directions = (!asked.at_voxels).then_some(found);
-        Ok(Some(light))
+        Ok(Some(Arc::new(light)))
     }
 }
 
@@ -113,8 +113,33 @@ mod tests {
                 ),
                 "stages[3].write.arrays[1]: render `r` follows no light from surface to surface; give it `bounce: 1`",
             ),
+            (
+                "  - render: {occlusion: screen_space, dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}}\n"
+                    .to_owned(),
+                "stages[1].render.sky: `screen_space` tells how much of the sky is hidden, not where it is open; take the \
+                 occlusion of an `occlusion` stage",
+            ),
+            (
+                format!(
+                    "{sobol}  - render: {{occlusion: screen_space, dimensions: [1, 1, 1]}}\n  - animate: {{frames: 2, scan: [0, 1], vti: \
+                     a.vti, arrays: [bent_normal]}}\n"
+                ),
+                "stages[3].animate.arrays[0]: `screen_space` tells how much of the sky is hidden, not where it is open; take \
+                 the occlusion of an `occlusion` stage",
+            ),
         ] {
             assert_eq!(told(&stages).unwrap_err(), expected);
+        }
+        let glass =
+            "  - scene: {objects: [{box: {min: [0, 0, 0, 0], max: [1, 1, 1, 1]}, opacity: 0.5}]}\n  - occlusion: {}\n";
+        for (key, value) in [("bounce", "1"), ("sky", "{gradient: [0, 1, 0, 0]}")] {
+            assert_eq!(
+                told(&format!("{glass}  - render: {{dimensions: [1, 1, 1], {key}: {value}}}\n")).unwrap_err(),
+                format!(
+                    "stages[3].render.{key}: object 1 lets light through, and where the sky is open is found among opaque \
+                     objects only; leave out `opacity` there"
+                )
+            );
         }
         for stages in [
             "  - render: {dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}}\n  - write: {vti: a.vti, arrays: [bent_normal, light]}\n",

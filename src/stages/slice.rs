@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::describe::Counts;
+use super::names::file_names;
 use super::occlusion::{self, OcclusionPlan};
 use super::range::check_length;
 use super::scene::ScenePlan;
@@ -125,7 +126,7 @@ impl Stage for SlicePlan {
             Output { beside: Vec::new(), key, tells: Some(file.clone()), file: file.clone() }
         };
         let list = list.iter().map(|file| {
-            let key = keys.hash(&(key, names(files)));
+            let key = keys.hash(&(key, file_names(files)));
             Output { beside: Vec::new(), key, tells: None, file: file.clone() }
         });
         files.iter().zip(places).map(slice).chain(list).collect()
@@ -183,7 +184,7 @@ impl Stage for SlicePlan {
         if let Some(list) = list.as_ref().filter(|list| run.is_stale(list)) {
             let path = plan.out.join(list);
             let mut file = AtomicFile::create(&path)?;
-            let names = names(files);
+            let names = file_names(files);
             let dated = places.iter().copied().zip(names.iter().map(String::as_str));
             pvd::write(&mut file, dated).map_err(AtomicFile::name_in(&path))?;
             let bytes = file.commit()?;
@@ -195,11 +196,6 @@ impl Stage for SlicePlan {
         };
         Ok(if stale.is_empty() { "as it was".to_owned() } else { format!("{faces} {what}") })
     }
-}
-
-/// The names of files as a list beside them has them.
-fn names(files: &[PathBuf]) -> Vec<String> {
-    files.iter().map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned()).collect()
 }
 
 /// The normal, checked.

@@ -31,7 +31,7 @@ use crate::geometry::Dimension;
 pub(super) const GAIN: f64 = 0.6;
 
 /// Groups there are, once as many rays are known.
-const LEAST_GROUPS: usize = 8;
+pub(super) const LEAST_GROUPS: usize = 8;
 
 /// A value, and how sure it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,7 +187,7 @@ impl Accumulator {
 }
 
 /// What no estimate of so many independent rays is below: the rule of three.
-fn bound(rays: u32) -> f64 {
+pub(super) fn bound(rays: u32) -> f64 {
     1.5 / f64::from(rays)
 }
 

@@ -9,7 +9,8 @@
 //! All of them give the same bits, since what a ray hits is decided by exact signs ([`crate::accel::Tracer`]), and the
 //! rays of a point depend on nothing but its number and the [`Sampling`]. What they share lies here: the
 //! [`ShadingPoint`], what its own simplices hide ([`Surroundings`]), its rays ([`Sequence`]), and what is made of them
-//! ([`Estimate`]). What rays hit, and where the open ones go, is [`gather`]ed on the processor.
+//! ([`Estimate`]). What rays hit, and where the open ones go, is [`gather`]ed on the processor, which alone traces rays of
+//! ambient occlusion among objects that let light through (`translucent`).
 
 mod backend;
 pub mod cpu;
@@ -19,7 +20,9 @@ mod noise;
 pub mod opencl;
 mod point;
 mod sampling;
+mod shares;
 mod surroundings;
+mod translucent;
 
 pub use backend::{Error, NOTHING, RayBackend};
 pub use estimate::Estimate;

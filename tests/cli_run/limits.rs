@@ -22,6 +22,10 @@ fn what_cannot_fit_is_told_before_anything_is_computed() {
     let bytes = 65_535u64 * 65_535 * (4 + (4 + 12 + 4 + 4) + (4 + 4 + 4 + 12));
     let told = format!("render image: one layer of its picture takes {bytes} bytes of memory, and ");
     folder.fails(&deep, 3, &[&told]);
+    // All layers that there may be, of which nobody can say before how many there are.
+    let layers = ["--set", "image.dimensions=[65535, 65535, 1]", "--set", "image.layers=1000"];
+    folder.fails(&layers, 3, &["render image: one layer of its picture takes ", "or layers"]);
+    folder.fails(&["--set", "image.layers=0"], 2, &["layers", "expected 1 to 1000, found 0"]);
     assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
 }
 
@@ -116,9 +120,50 @@ fn files_larger_than_the_memory() {
     assert!(code == Some(0) && told.contains("25000000") && told.contains("0 to 0, mean 0"), "{told}");
     let (code, told) = ao4d("compare b.f32 b.f32");
     assert!(code == Some(0) && told.contains("75000000 numbers, all equal"), "{told}");
+    // A file may ask for more than it is long: here 40 arrays of 16 MB that are one and the same few bytes.
+    let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    for _ in 0..16 {
+        std::io::Write::write_all(&mut packed, &[0; 1 << 20]).unwrap();
+    }
+    let packed = packed.finish().unwrap();
+    let arrays: String =
+        (0..40).map(|i| format!("<DataArray type='UInt8' Name='a{i}' format='appended' offset='0'/>")).collect();
+    let head = format!(
+        "<VTKFile type='ImageData' version='1.0' byte_order='LittleEndian' header_type='UInt64' \
+         compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 255 0 255 0 255'><Piece><PointData>{arrays}</PointData>\
+         </Piece></ImageData><AppendedData encoding='raw'>_"
+    );
+    let sizes = [1, 1 << 24, 0, packed.len() as u64].map(u64::to_le_bytes).concat();
+    std::fs::write(folder.path("f.vti"), [head.as_bytes(), &sizes, &packed, b"</AppendedData></VTKFile>"].concat())
+        .unwrap();
+    let (code, told) = ao4d("info f.vti");
+    assert_eq!(code, Some(2), "{told}");
+    assert!(told.contains("takes 16777216 bytes, and there is room for "), "{told}");
+    // Points of a byte a coordinate.
+    let head = "ply\nformat binary_little_endian 1.0\nelement vertex 500000\nproperty uchar x\nproperty uchar y\nproperty uchar z\n\
+                element face 0\nproperty list uchar int vertex_indices\nend_header\n";
+    std::fs::write(folder.path("g.ply"), [head.as_bytes(), &[7; 1_500_000]].concat()).unwrap();
+    let (code, told) = ao4d("info g.ply");
+    assert!(code == Some(0) && told.contains("a mesh of 500000 points"), "{told}");
     for arguments in ["info c.stl", "info d.vti", "info e.ply", "compare c.stl c.stl"] {
         let (code, told) = ao4d(arguments);
         assert_eq!(code, Some(2), "{arguments}: {told}");
         assert!(told.contains("needs about 900000000 bytes of memory, and "), "{arguments}: {told}");
+    }
+    // As an input of a run it is looked at block by block, too: what changes within it makes new files.
+    let pipeline = "name: large
+stages:
+  - scene: {dimension: 3, objects: [{isosurface: {field: {image: {file: a.raw, dimensions: [1000, 1000, 300], type: uint8, crop: {from: [0, 0, 0], to: [4, 4, 4]}}}, isovalue: 1}}]}
+  - render: {occlusion: none, dimensions: [4, 4]}
+  - write: {vti: a.vti}
+";
+    std::fs::write(folder.path("large.yaml"), pipeline).unwrap();
+    for (place, made) in [(None, true), (None, false), (Some(200_000_000), true), (None, false)] {
+        if let Some(place) = place {
+            let file = std::fs::File::options().write(true).open(folder.path("a.raw")).unwrap();
+            std::os::unix::fs::FileExt::write_all_at(&file, &[1], place).unwrap();
+        }
+        let (code, told) = ao4d("run -q --threads 1 large.yaml");
+        assert!(code == Some(0) && told.contains("a.vti") && told.contains("unchanged") != made, "{place:?}: {told}");
     }
 }

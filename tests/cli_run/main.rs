@@ -2,12 +2,15 @@
 
 mod caching;
 mod faults;
+mod frames;
 mod input;
 mod interrupt;
 mod limits;
 mod mesh;
 mod pictures;
 mod provenance;
+mod shade;
+mod twins;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

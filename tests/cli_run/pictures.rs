@@ -10,10 +10,12 @@ fn the_number_of_threads_changes_no_byte() {
   - render: {id: voxel, dimensions: [10, 8, 6], shading: voxel}
   - write: {vti: voxel.vti, arrays: [rgba, ambient_occlusion, opacity, rgb, depth, object, normal]}
   - render: {id: flat, dimensions: [9, 8, 7], shading: flat, camera: {projection: parallel, height: 2}}
-  - write: {vti: zlib.vti, compression: zlib}
-  - write: {vti: lz4.vti, compression: lz4}
-  - write: {vti: inline.vti, encoding: inline}
-  - write: {vti: inline-zlib.vti, encoding: inline, compression: zlib, raw: flat.raw, png: flat.png, vtu: flat.vtu}
+  - render: {id: space, dimensions: [9, 8, 7], occlusion: screen_space, screen_space: {slices: 6, steps: 5}, supersample: 2}
+  - write: {vti: space.vti, arrays: [ambient_occlusion, occlusion_error]}
+  - write: {input: flat, vti: zlib.vti, compression: zlib}
+  - write: {input: flat, vti: lz4.vti, compression: lz4}
+  - write: {input: flat, vti: inline.vti, encoding: inline}
+  - write: {input: flat, vti: inline-zlib.vti, encoding: inline, compression: zlib, raw: flat.raw, png: flat.png, vtu: flat.vtu}
 ";
     let folder = Folder::with(&pipeline);
     for threads in ["1", "2", "5"] {
@@ -21,7 +23,7 @@ fn the_number_of_threads_changes_no_byte() {
     }
     folder.runs(&["--out", "all"]);
     let one = contents(&folder.path("1"));
-    assert_eq!(one.len(), FILES.len() + 11);
+    assert_eq!(one.len(), FILES.len() + 12);
     for other in ["2", "5", "all"] {
         let other = contents(&folder.path(other));
         assert!(one.keys().eq(other.keys()));

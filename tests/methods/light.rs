@@ -315,7 +315,7 @@ fn pictures_under_a_sky<const D: usize>() {
                 skylight.directions = Some(Arc::clone(&found));
                 skylight.bounced = Some(Arc::clone(&bounced));
             }
-            renderer.skylight = Some(skylight);
+            renderer.skylight = Some(Arc::new(skylight));
             renderer.lighting = lit.then(|| Lighting::new(vec![], 0.7));
             if is_denoised {
                 renderer.filters.extend(denoise(&renderer.camera, &renderer.grid, sampling));

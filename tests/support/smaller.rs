@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ao4d::geometry::Dimension;
 use ao4d::pipeline::Pipeline;
+use ao4d::stages::animate::AnimatePlan;
 use ao4d::stages::occlusion::{OcclusionPlan, OcclusionSource, Samples};
 use ao4d::stages::render::RenderPlan;
 
@@ -26,7 +27,7 @@ pub fn pipelines() -> Vec<PathBuf> {
     found
 }
 
-/// Overrides that make images of a pipeline smaller, and its rays fewer. Every stage still does its work.
+/// Overrides that make images of a pipeline smaller, its films shorter, and its rays fewer. Every stage still does its work.
 pub fn smaller(path: &Path) -> Vec<String> {
     let plan = Pipeline::load(path, &[], None).unwrap().plan;
     let mut overrides = Vec::new();
@@ -38,6 +39,9 @@ pub fn smaller(path: &Path) -> Vec<String> {
         let [x, y, z] = render.dimensions.map(|d| (d * most / longest).max(d.min(2)));
         let dimensions = if flat { format!("[{x}, {y}]") } else { format!("[{x}, {y}, {z}]") };
         overrides.push(format!("{}.dimensions={dimensions}", plan.path(stage)));
+    }
+    for (stage, animation) in plan.all::<AnimatePlan>() {
+        overrides.push(format!("{}.frames={}", plan.path(stage), animation.files.len().min(3)));
     }
     for (stage, occlusion) in plan.all::<OcclusionPlan>() {
         if let OcclusionSource::Compute(computation) = &occlusion.source

@@ -17,6 +17,7 @@ mod numbers;
 mod raw;
 mod sequence;
 mod tiff;
+mod units;
 mod vti;
 
 use std::path::{Path, PathBuf};
@@ -209,7 +210,7 @@ fn stored(input: &Input, request: &Request) -> Result<Opened, Error> {
             return Err(input.wrong(format!("can't tell what it holds; the name must end in one of {known}")));
         }
     };
-    open(&input.path, length, request).map_err(|message| input.wrong(message))
+    open(&input.path, length, request).map(Opened::in_one_unit).map_err(|message| input.wrong(message))
 }
 
 fn arranged(input: &Input, request: &Request) -> Result<Image, Error> {

@@ -117,7 +117,9 @@ impl Header {
             [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), a * a + d * d - b * b - c * c],
         ];
         let handed = if self.pixdim(0) < 0.0 { -1.0 } else { 1.0 };
-        let step = |i: usize| self.pixdim(i + 1).abs() * if i == 2 { handed } else { 1.0 };
+        // A step of 0, as flat images have it, counts as 1: so NIfTI's own library reads it.
+        let length = |i: usize| Some(self.pixdim(i + 1).abs()).filter(|&step| step > 0.0).unwrap_or(1.0);
+        let step = |i: usize| length(i) * if i == 2 { handed } else { 1.0 };
         Some((std::array::from_fn(|i| std::array::from_fn(|r| rotation[r][i] * step(i))), offset))
     }
 }
@@ -251,6 +253,9 @@ pub(super) fn open(path: &Path, _: u64, request: &Request) -> Result<Opened, Str
     if let Some((steps, origin)) = header.placement().filter(|_| request.placement == Placement::World) {
         for (axis, step) in opened.axes.iter_mut().zip(steps) {
             let length = step.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if length == 0.0 && axis.size == 1 {
+                continue; // nothing lies along it
+            }
             if !(length.is_finite() && length > 0.0) {
                 return Err(format!(
                     "places its axis {} by a step of length {length}; placement: stored does without",

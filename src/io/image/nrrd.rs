@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::axes::{Axis, Opened, Positions, Role};
 use super::numbers::{Bytes, Meaning, Numbers, Packing, Stream, Words, stream};
+use super::units::metres;
 use super::{Request, counted, fits, holds};
 use crate::volume::Kind;
 
@@ -145,7 +146,11 @@ pub(super) fn open(path: &Path, _: u64, _: &Request) -> Result<Opened, String> {
     if sizes.is_empty() || sizes.len() > 16 {
         return Err(format!("has {} axes, which can't be", sizes.len()));
     }
-    let kind = kind(&fields.needed("type")?)?;
+    let dimension = fields.whole("dimension")?;
+    if fields.bytes("dimension").is_some() && dimension != sizes.len() as i64 {
+        return Err(format!("has the dimension {dimension}, and {} sizes", sizes.len()));
+    }
+    let kind = kind(&fields.needed("type")?.to_lowercase())?;
     let mut notes = Vec::new();
     if fields.bytes("oldmin").is_some() || fields.bytes("oldmax").is_some() {
         notes.push("its values were quantized (old min, old max); they are read as they are stored".to_owned());
@@ -178,7 +183,7 @@ fn values(
         }
     };
     let text = packing == Packing::None && encoding != "raw";
-    let little_endian = match fields.text("endian").as_deref() {
+    let little_endian = match fields.text("endian").map(|order| order.to_lowercase()).as_deref() {
         Some("little") => true,
         Some("big") => false,
         _ if kind.size() == 1 || text => true,
@@ -303,10 +308,37 @@ fn axes(fields: &Fields, sizes: &[usize], notes: &mut Vec<String>) -> Result<(Ve
     };
     let (kinds, centres) = (words("kinds"), [words("centerings"), words("centers")].concat());
     let (labels, units) = (quoted(fields.text("labels")), quoted(fields.text("units")));
-    let space_units = quoted(fields.text("spaceunits"));
-    let directions = vectors(&fields.text("spacedirections").unwrap_or_default())?;
+    let mut space_units = quoted(fields.text("spaceunits"));
+    let mut directions = vectors(&fields.text("spacedirections").unwrap_or_default())?;
     let spacings = fields.numbers("spacings")?;
     let (mins, maxs) = (fields.numbers("axismins")?, fields.numbers("axismaxs")?);
+    for (name, count) in [
+        ("kinds", kinds.len()),
+        ("centerings", centres.len()),
+        ("space directions", directions.len()),
+        ("spacings", spacings.len()),
+        ("axis mins", mins.len()),
+        ("axis maxs", maxs.len()),
+    ] {
+        if count != 0 && count != sizes.len() {
+            return Err(format!("has {count} {name} for {} axes", sizes.len()));
+        }
+    }
+    // Each axis of the world has a unit of its own; all are brought to the first's.
+    let mut measures = [1.0; 4];
+    let lengths: Vec<Option<f64>> = space_units.iter().map(|unit| metres(unit)).collect();
+    if let Some(Some(wanted)) = lengths.first()
+        && lengths.iter().flatten().any(|length| length != wanted)
+    {
+        notes.push(format!("its space units, {}, are brought to {}", space_units.join(", "), space_units[0]));
+        for (k, length) in lengths.iter().enumerate().take(4) {
+            if let Some(length) = length {
+                measures[k] = length / wanted;
+                space_units[k] = space_units[0].clone();
+            }
+        }
+    }
+    directions.iter_mut().flatten().for_each(|vector| (0..4).for_each(|k| vector[k] *= measures[k]));
     let mut axes = Vec::new();
     for (i, &size) in sizes.iter().enumerate() {
         let kind = kinds.get(i).map_or("", String::as_str).trim_matches('?');
@@ -365,7 +397,7 @@ fn axes(fields: &Fields, sizes: &[usize], notes: &mut Vec<String>) -> Result<(Ve
     if let Some(Some(vector)) = vectors(&fields.text("spaceorigin").unwrap_or_default())?.first() {
         // A file may leave the origin open.
         if vector.iter().all(|x| x.is_finite()) {
-            origin = *vector;
+            origin = std::array::from_fn(|k| vector[k] * measures[k]);
         }
     }
     Ok((axes, origin))

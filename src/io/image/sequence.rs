@@ -5,7 +5,7 @@
 
 use super::axes::{Axis, Frame, Image, Positions};
 use super::numbers::Numbers;
-use super::{Error, Input, Request, arranged};
+use super::{Error, Input, Request, arranged, units};
 
 pub(super) fn open(inputs: Vec<Input>, request: &Request) -> Result<Image, Error> {
     let first = &inputs[0];
@@ -17,7 +17,7 @@ pub(super) fn open(inputs: Vec<Input>, request: &Request) -> Result<Image, Error
     extend(&image.axes[3]);
     for input in &inputs[1..] {
         let other = arranged(input, request)?;
-        agree(&image, &other).map_err(|what| {
+        agree(&image, &other, !request.count_times).map_err(|what| {
             input.wrong(format!(
                 "{what}, unlike the first file, {}; files of a sequence share one grid",
                 first.path.display()
@@ -53,13 +53,18 @@ pub(super) fn open(inputs: Vec<Input>, request: &Request) -> Result<Image, Error
 }
 
 /// What of a grid differs from the first.
-fn agree(first: &Image, other: &Image) -> Result<(), String> {
+fn agree(first: &Image, other: &Image, in_time: bool) -> Result<(), String> {
     if first.points() != other.points() {
         return Err(format!("has {:?} points, not {:?}", other.points(), first.points()));
     }
     let mut size = 0f64;
     for (axis, (a, b)) in first.axes[..3].iter().zip(&other.axes).enumerate() {
         let (ends, others) = ([0, a.size - 1].map(|i| a.positions.at(i)), [0, b.size - 1].map(|i| b.positions.at(i)));
+        if let (Some(unit), Some(others)) = (&a.unit, &b.unit)
+            && !units::same(unit, others)
+        {
+            return Err(format!("is in {others} along {}, not in {unit}", ["x", "y", "z"][axis]));
+        }
         let length = (ends[1] - ends[0]).abs().max(a.positions.step().abs());
         size = size.max(length);
         // Places are often written with few digits.
@@ -70,6 +75,12 @@ fn agree(first: &Image, other: &Image) -> Result<(), String> {
                 others[0], others[1], ends[0], ends[1]
             ));
         }
+    }
+    if let (Some(unit), Some(others)) = (&first.axes[3].unit, &other.axes[3].unit)
+        && in_time
+        && unit != others
+    {
+        return Err(format!("has its times in {others}, not in {unit} (spacing counts the files instead)"));
     }
     let near = |a: &[f64], b: &[f64], size: f64| a.iter().zip(b).all(|(x, y)| (x - y).abs() <= 1e-5 * size);
     match (&first.frame, &other.frame) {

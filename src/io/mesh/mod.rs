@@ -119,6 +119,9 @@ impl Input {
     pub fn read_cells(&self, wanted: Wanted<'_>) -> Result<UnstructuredGrid, InputError> {
         let ending = self.ending();
         if !ENDINGS.contains(&ending.as_str()) {
+            if let Some(remedy) = remedy(&ending) {
+                return Err(self.wrong(format!("unsupported: .{ending} files; {remedy}")));
+            }
             let known = "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or .series";
             return Err(self.wrong(format!("can't tell what it holds; {known}")));
         }
@@ -126,21 +129,31 @@ impl Input {
         if bytes.is_empty() {
             return Err(self.wrong("is empty"));
         }
+        // Some editors put this mark before a text.
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
         if series::is_list(&self.path) {
             return self.read_list(wanted);
         }
         let grid = match ending.as_str() {
-            "stl" => stl::read(&bytes),
-            "ply" => ply::read(&bytes),
-            "obj" => obj::read(&bytes),
-            "msh" => msh::read(&bytes),
-            _ => match vtk::parse_at(&bytes, wanted, Some(&self.path)) {
+            "stl" => stl::read(bytes),
+            "ply" => ply::read(bytes),
+            "obj" => obj::read(bytes),
+            "msh" => msh::read(bytes),
+            _ => match vtk::parse_at(bytes, wanted, Some(&self.path)) {
                 Ok(DataSet::Unstructured(grid)) => Ok(grid),
                 Ok(DataSet::Image(_)) => Err("holds an image, where a mesh was expected".into()),
                 Err(problem) => Err(problem.to_string()),
             },
         };
-        grid.map_err(|message| self.wrong(message))
+        let grid = grid.map_err(|message| self.wrong(message))?;
+        let count = grid.points.len();
+        match grid.connectivity.iter().position(|&index| index as usize >= count) {
+            Some(at) => {
+                let (cell, index) = (grid.offsets.partition_point(|&end| end <= at), grid.connectivity[at]);
+                Err(self.wrong(format!("is damaged: its cell {cell} names point {index} of {count}")))
+            }
+            None => Ok(grid),
+        }
     }
 
     /// Reads the files of a list over time, which are the parts of one mesh.
@@ -164,6 +177,21 @@ impl Input {
         }
         vtk::joined(parts).map_err(|problem| self.wrong(problem.to_string()))
     }
+}
+
+/// How to come from a format that isn't read, of files with this ending, to one that is.
+pub fn remedy(ending: &str) -> Option<&'static str> {
+    Some(match ending {
+        "vtm" | "vtpd" | "vthb" | "vtkhdf" | "vtr" | "vts" | "pvtr" | "pvts" => {
+            "in ParaView: Merge Blocks or Extract Surface, and save as .vtu or .vtp"
+        }
+        "off" | "gltf" | "glb" | "3mf" | "dae" | "fbx" | "x3d" | "wrl" | "3ds" | "blend" | "amf" => {
+            "export .ply, .obj or .stl from Blender or MeshLab"
+        }
+        "step" | "stp" | "iges" | "igs" | "brep" => "mesh it: gmsh -2 IN -o OUT.stl, or gmsh -3 IN -o OUT.msh",
+        "inp" | "bdf" | "nas" | "mesh" | "med" | "exo" | "e" | "xdmf" | "cgns" => "meshio convert IN OUT.vtu",
+        _ => return None,
+    })
 }
 
 fn check(mesh: &FileMesh) -> Result<(), String> {

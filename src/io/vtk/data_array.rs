@@ -8,6 +8,7 @@ use roxmltree::Node;
 
 use super::Field;
 use super::Problem;
+use super::Wanted;
 use super::blocks::{declared, decompress};
 use super::document::{Appended, Document, required};
 use crate::volume::{Array, Kind, Values};
@@ -29,7 +30,7 @@ pub(super) fn attributes(
 ) -> Result<Vec<Array>, Problem> {
     let mut arrays: Vec<Array> = Vec::new();
     for parent in piece.children().filter(|n| n.has_tag_name(element)) {
-        let asked = |node: &Node<'_, '_>| node.attribute("Name").is_none_or(|name| document.wanted.takes(name));
+        let asked = |node: &Node<'_, '_>| is_wanted(document, node);
         for node in parent.children().filter(Node::is_element).filter(asked) {
             let array = array(document, node, Some(tuples))?;
             if arrays.iter().any(|a| a.name == array.name) {
@@ -45,7 +46,7 @@ pub(super) fn attributes(
 pub(super) fn field_data(document: &Document<'_>) -> Result<Vec<Field>, Problem> {
     let mut fields = Vec::new();
     let children = document.data_set.children().filter(|n| n.has_tag_name("FieldData"));
-    let asked = |node: &Node<'_, '_>| node.attribute("Name").is_none_or(|name| document.wanted.takes(name));
+    let asked = |node: &Node<'_, '_>| is_wanted(document, node);
     for node in children.flat_map(|n| n.children()).filter(Node::is_element).filter(asked) {
         fields.push(if node.attribute("type") == Some("String") {
             Field::Text(name(node)?, strings(document, node)?)
@@ -54,6 +55,13 @@ pub(super) fn field_data(document: &Document<'_>) -> Result<Vec<Field>, Problem>
         });
     }
     Ok(fields)
+}
+
+/// Whether an array is to be read.
+fn is_wanted(document: &Document<'_>, node: &Node<'_, '_>) -> bool {
+    let known = |kind: &str| kind == "Bit" || Kind::from_vtk_name(kind).is_some();
+    node.attribute("Name").is_none_or(|name| document.wanted.takes(name))
+        && (document.wanted != Wanted::Numbers || node.attribute("type").is_none_or(known))
 }
 
 /// The array of a `<DataArray>`; `tuples` is how many it must have, where that is known.

@@ -79,6 +79,8 @@ impl Field {
 pub enum Wanted<'a> {
     /// All of them.
     All,
+    /// All whose numbers are of a type known here.
+    Numbers,
     /// Those of these names, on points, on cells, or of the data set.
     Named(&'a [&'a str]),
 }
@@ -87,7 +89,7 @@ impl Wanted<'_> {
     /// Whether the array of this name is.
     pub fn takes(&self, name: &str) -> bool {
         match self {
-            Wanted::All => true,
+            Wanted::All | Wanted::Numbers => true,
             Wanted::Named(names) => names.contains(&name),
         }
     }

@@ -4,8 +4,8 @@
 //!
 //! - [`convergence`]: every method with 16, 64, 256, ... rays a vertex against the exact values. A level is repeated with other
 //!   seeds until it has traced [`convergence::RAYS`] rays, so that a scene of eight vertices gives smooth curves too;
-//! - [`pictures`]: every way to shade an image, `flat`, `smooth`, `voxel`, `voxel` denoised, and `auto`, against the value of
-//!   each visible point itself;
+//! - [`pictures`]: every way to shade an image, `flat`, `smooth`, `voxel`, `voxel` denoised, `auto`, and
+//!   `screen_space`, against the value of each visible point itself;
 //! - [`precision`]: on how many rays plain Cramer's rule, in `f32` and in `f64`, says something else than exact signs; and
 //!   what each deviation of the published algorithm does to its values.
 //!
@@ -77,9 +77,14 @@ pub fn study(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) 
 fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, RunError> {
     let plan = &pipeline.plan;
     let refuse = |path: &str, message: &str| RunError::Refused(pipeline.document.refuse(Invalid::new(path, message)));
-    let Some((stage, occlusion)) = plan.all::<OcclusionPlan>().next() else {
+    let Some((stage, occlusion)) = plan.all::<OcclusionPlan>().find(|(stage, _)| !plan.is_twin(stage.index())) else {
         return Err(refuse("stages", "there is no `occlusion` to study; add one after the scene"));
     };
+    if plan[occlusion.scene].is_translucent() {
+        let message = "light passes some of its objects, and the truth that methods are held against knows opaque ones only; \
+                       leave out their `opacity`";
+        return Err(refuse(plan.path(occlusion.scene), message));
+    }
     let _lock = Lock::take(&plan.out)?;
     let running = progress.stage("scene", 0);
     let prepared = pipeline.prepare(|stage| stage == occlusion.scene.index());
@@ -92,7 +97,7 @@ fn study_here(pipeline: &Pipeline, progress: &dyn Progress) -> Result<Study, Run
             notes.push("`max_distance` is left out: all methods count occluders at any distance.".to_owned());
         }
     }
-    if plan.all::<OcclusionPlan>().count() > 1 {
+    if plan.all::<OcclusionPlan>().filter(|(stage, _)| !plan.is_twin(stage.index())).count() > 1 {
         notes.push(format!(
             "The pipeline has several occlusions; this is the scene of the first, `{}`.",
             plan.id(stage)

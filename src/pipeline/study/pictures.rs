@@ -1,8 +1,8 @@
 //! Every way to shade an image: its error against the time it takes.
 //!
 //! `flat` and `smooth` spread the vertices' values over each simplex; `voxel` takes rays at each visible point, and
-//! `voxel+denoise` filters what few rays found there; `auto` interpolates and mends. The truth is the value at each visible
-//! point itself, exact or by many rays. The image is the pipeline's first of the scene, with fewer voxels.
+//! `voxel+denoise` filters what few rays found there; `auto` interpolates and mends; `screen_space` looks at the image
+//! alone. The truth is the value at each visible point itself, exact or by many rays. The image is the pipeline's first of the scene, with fewer voxels.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,7 +15,7 @@ use crate::pipeline::RunError;
 use crate::progress::Progress;
 use crate::render::filters::denoise;
 use crate::render::filters::denoise::Refine;
-use crate::render::{Aov, Renderer, Shading};
+use crate::render::{Aov, Renderer, ScreenSpace, Shading};
 use crate::stages::camera::camera;
 use crate::stages::render::RenderPlan;
 use crate::trace::cpu::CpuBackend;
@@ -29,13 +29,14 @@ const REFERENCE: u32 = 1024;
 /// Scenes with at most so many simplices have an exact reference.
 const EXACT_UP_TO: usize = 100;
 const BUDGET: Budget = Budget { cones: 20_000 };
-/// What is compared, each with so many rays a vertex or, by `voxel`, a voxel.
+/// What is compared, each with so many rays a vertex or, by `voxel`, a voxel; in screen space with so many slices.
 const SHADINGS: &[(&str, &[u32])] = &[
     ("flat", &[16, 64, 256, 1024]),
     ("smooth", &[16, 64, 256, 1024]),
     ("voxel", &[4, 16, 64, 256]),
     ("voxel+denoise", &[1, 4, 16, 64]),
     ("auto", &[64, 256, 1024]),
+    ("screen_space", &[8, 32]),
 ];
 
 /// The standard error to which `auto` keeps, as a render does where nothing else is said.
@@ -62,7 +63,7 @@ pub struct Pictures {
 #[derive(Clone, Debug)]
 pub struct PictureRow {
     pub shading: &'static str,
-    /// Rays a vertex, or a voxel.
+    /// Rays a vertex, or a voxel; slices in screen space.
     pub samples: u32,
     pub errors: Errors,
     /// All of it, values and image, on all threads.
@@ -139,6 +140,10 @@ pub fn measure<const D: usize>(
                     "flat" => image(Shading::Flat(at_vertices()?)),
                     "smooth" => image(Shading::Smooth(at_vertices()?)),
                     "voxel" => image(Shading::Voxel(by_rays(samples))),
+                    "screen_space" => {
+                        let slices = samples as usize;
+                        image(Shading::ScreenSpace(ScreenSpace { slices, ..ScreenSpace::default() }))
+                    }
                     "voxel+denoise" => filtered(Shading::Voxel(by_rays(samples)), Some(samples), None),
                     _ => {
                         let own = rays_beside(samples);

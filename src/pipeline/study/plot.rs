@@ -50,6 +50,7 @@ fn colour(name: &str) -> &'static str {
         "sobol" | "smooth" => "#009e73",
         "exact" => "#555555",
         "voxel+denoise" => "#56b4e9",
+        "screen_space" => "#e69f00",
         _ => "#cc79a7",
     }
 }
@@ -60,6 +61,7 @@ fn marker(name: &str, x: f64, y: f64) -> String {
         "as_published" | "flat" => format!("<rect x='{:.1}' y='{:.1}' width='7' height='7'/>", x - 3.5, y - 3.5),
         "random" | "voxel" => format!("<circle cx='{x:.1}' cy='{y:.1}' r='3.8'/>"),
         "voxel+denoise" => format!("<path d='M{x:.1} {:.1}l4.8 8h-9.6z'/>", y - 5.0),
+        "screen_space" => format!("<path d='M{:.1} {:.1}h3v3h3v3h-3v3h-3v-3h-3v-3h3z'/>", x - 1.5, y - 4.5),
         "auto" => format!("<path d='M{x:.1} {:.1}l4.8 -8h-9.6z'/>", y + 5.0),
         _ => format!("<path d='M{x:.1} {:.1}l4.6 4.6l-4.6 4.6l-4.6 -4.6z'/>", y - 4.6),
     }

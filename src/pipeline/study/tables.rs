@@ -94,13 +94,13 @@ pub(super) fn markdown(study: &Study) -> String {
         line(format_args!("\n## Shading\n"));
         line(format_args!(
             "The image `{}` with {x} x {y} x {z} voxels, {} of which see something, against {}. `flat` and `smooth` take rays \
-             at vertices, `voxel` at each voxel, `auto` at vertices and first a sixteenth of them, 4 to 16, at each voxel, then as many as keep to an error of 0.01; time is \
+             at vertices, `voxel` at each voxel, `auto` at vertices and first a sixteenth of them, 4 to 16, at each voxel, then as many as keep to an error of 0.01; `screen_space` takes none, and looks into so many slices of the image; time is \
              that of the whole image on all threads.\n",
             pictures.render,
             grouped(pictures.seen as u64),
             pictures.reference
         ));
-        line(format_args!("| shading | rays | RMS error | largest | bias | time |"));
+        line(format_args!("| shading | rays or slices | RMS error | largest | bias | time |"));
         line(format_args!("| --- | ---: | ---: | ---: | ---: | ---: |"));
         for r in &pictures.rows {
             let Errors { rms, maximum, bias } = r.errors;

@@ -3,7 +3,7 @@
 //! A contour or a volume rendering interpolates between voxels. Where a body ends, it mixes the body's colour and
 //! occlusion with whatever stands in the empty voxel beside it, and white or "open" there would make rims that nothing in
 //! the scene has. So values bleed outwards, layer upon layer of voxels, by normalised convolution (Knutsson and Westin
-//! 1993): a voxel next to some that have values takes their mean, weighted by coverage and by 1 / distance^2. Opacity
+//! 1993): a voxel next to some that have values takes their mean, weighted by opacity and by 1 / distance^2. Opacity
 //! and coverage stay what they are, and tell what is real.
 
 use rayon::prelude::*;
@@ -24,11 +24,13 @@ pub struct Dilate {
 /// A voxel's values on their way outwards.
 #[derive(Clone, Copy, Debug)]
 struct Value<const D: usize> {
-    /// How much it counts: coverage, or 1 where it was filled; 0 where there is nothing yet.
+    /// How much it counts: opacity, or 1 where it was filled; 0 where there is nothing yet.
     weight: f32,
     albedo: [f32; 3],
     /// Black where the picture is not lit.
     direct: [f32; 3],
+    /// Black where all is opaque.
+    behind: [f32; 3],
     occlusion: f32,
     /// Zero where the picture has none of these.
     direction: Vector<D>,
@@ -38,7 +40,8 @@ struct Value<const D: usize> {
 impl<const D: usize> Value<D> {
     fn nothing() -> Self {
         let black = [0.0; 3];
-        Self { weight: 0.0, albedo: black, direct: black, occlusion: 0.0, direction: Vector::zeros(), hidden: black }
+        let direction = Vector::zeros();
+        Self { weight: 0.0, albedo: black, direct: black, behind: black, occlusion: 0.0, direction, hidden: black }
     }
 }
 
@@ -84,14 +87,16 @@ fn step<const D: usize>(values: &mut [Value<D>], filled: &mut [u8], dimensions: 
                 for c in 0..3 {
                     sum.albedo[c] += weight * value.albedo[c];
                     sum.direct[c] += weight * value.direct[c];
+                    sum.behind[c] += weight * value.behind[c];
                     sum.hidden[c] += weight * value.hidden[c];
                 }
                 sum.direction += value.direction * weight;
             }
         }
-        let [albedo, direct, hidden] = [sum.albedo, sum.direct, sum.hidden].map(|sum| sum.map(|c| c / total));
+        let [albedo, direct, behind, hidden] =
+            [sum.albedo, sum.direct, sum.behind, sum.hidden].map(|sum| sum.map(|c| c / total));
         let (occlusion, direction) = (sum.occlusion / total, sum.direction / total);
-        Value { weight: 1.0, albedo, direct, occlusion, direction, hidden }
+        Value { weight: 1.0, albedo, direct, behind, occlusion, direction, hidden }
     };
     let found: Vec<(usize, Value<D>)> =
         rim(filled, dimensions).into_par_iter().with_min_len(256).map(|n| (n, mean(n))).collect();
@@ -113,11 +118,11 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         // Where the window ends and the image goes on, the outermost layer of each step misses neighbours; what that
         // spoils moves inwards by a layer a step, and so stays within the halo.
         let value = |i: usize| {
-            let (weight, albedo, occlusion) = (input.coverage[i], input.albedo[i], input.occlusion[i]);
-            let direct = input.direct.get(i).copied().unwrap_or_default();
+            let (weight, albedo, occlusion) = (input.opacity(i), input.albedo[i], input.occlusion[i]);
+            let [direct, behind, hidden] =
+                [&input.direct, &input.behind, &input.hidden].map(|column| column.get(i).copied().unwrap_or_default());
             let direction = input.direction.get(i).copied().unwrap_or_else(Vector::zeros);
-            let hidden = input.hidden.get(i).copied().unwrap_or_default();
-            Value { weight, albedo, direct, occlusion, direction, hidden }
+            Value { weight, albedo, direct, behind, occlusion, direction, hidden }
         };
         let mut values: Vec<Value<D>> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
         let mut filled: Vec<u8> = values.iter().map(|value| u8::from(value.weight > 0.0)).collect();
@@ -133,6 +138,9 @@ impl<const D: usize> ImageFilter<D> for Dilate {
                 (out.albedo[i], out.occlusion[i]) = (value.albedo, value.occlusion);
                 if let Some(direct) = out.direct.get_mut(i) {
                     *direct = value.direct;
+                }
+                if let Some(behind) = out.behind.get_mut(i) {
+                    *behind = value.behind;
                 }
                 if let Some(direction) = out.direction.get_mut(i) {
                     *direction = value.direction;

@@ -1,4 +1,4 @@
-//! What each voxel sees: the simplex that the ray through its centre hits first.
+//! What each voxel sees: the simplex that the ray through its centre hits first, or all that it passes ([`Passages`]).
 //!
 //! There are two ways to find out, and both give the same simplex in every voxel, ties included:
 //!
@@ -11,6 +11,7 @@
 //! [`Method::Auto`] takes what the numbers of simplices, rows and voxels promise to be the cheaper.
 
 mod footprint;
+mod passages;
 mod raster;
 
 use std::ops::Range;
@@ -20,12 +21,14 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use self::passages::Search;
 use self::raster::Raster;
 use super::Camera;
 use crate::progress::Progress;
 use crate::trace::{Error, RayBackend};
 use crate::volume::Grid;
 
+pub use self::passages::Passages;
 /// Stands for a simplex where a voxel sees none.
 pub use crate::trace::NOTHING;
 
@@ -105,6 +108,20 @@ impl<const D: usize> Visibility<D> {
         };
         self.turn_to_eye(layers, &mut found, progress)?;
         Ok(found)
+    }
+
+    /// All surfaces that the ray through each voxel of some layers passes, x fastest, front to back; of each voxel the first
+    /// `most` are kept. The first is what [`Visibility::first_hits`] tells. The processor finds them, whatever the backend.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` says so.
+    pub fn passages(&self, layers: Range<usize>, most: usize, progress: &dyn Progress) -> Result<Passages, Error> {
+        let Self { camera, grid, away, .. } = self;
+        let search = Search { tracer: self.backend.tracer(), camera, grid, away, most, progress };
+        Ok(match &self.raster {
+            Some(raster) => search.rasterize(raster, layers)?,
+            None => search.cast(layers)?,
+        })
     }
 
     /// Where a voxel sees a simplex from behind, looks for one in the same place that faces the eye: the other side of a

@@ -21,11 +21,11 @@ use crate::render::camera::{Camera, Lens};
 use crate::volume::Grid;
 
 /// Simplices between two looks at whether to go on.
-const BATCH: usize = 1 << 12;
+pub(super) const BATCH: usize = 1 << 12;
 
 /// The voxels that a simplex may cover: the first and the last along each axis. Image dimensions fit 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Box3 {
+pub(super) struct Box3 {
     first: [u16; 3],
     last: [u16; 3],
 }
@@ -143,6 +143,19 @@ impl Raster {
         raster < grid.len() as f64 * (50.0 + 60.0 * depth) + build
     }
 
+    /// The simplices that some layers may show, ascending.
+    pub fn within(&self, layers: &Range<usize>) -> Vec<u32> {
+        let meets = |b: &Box3| usize::from(b.first[2]) < layers.end && usize::from(b.last[2]) >= layers.start;
+        (self.boxes.par_iter().enumerate().with_min_len(4096))
+            .filter_map(|(s, b)| (!b.is_empty() && meets(b)).then_some(s as u32))
+            .collect()
+    }
+
+    /// The box of a simplex.
+    pub fn frame(&self, simplex: u32) -> &Box3 {
+        &self.boxes[simplex as usize]
+    }
+
     /// The simplex that each voxel of some layers sees first.
     pub fn first_hits<const D: usize>(
         &self,
@@ -154,14 +167,9 @@ impl Raster {
     ) -> Result<Vec<u32>, Cancelled> {
         let [width, height, _] = grid.dimensions;
         let lens = camera.lens(grid);
-        let meets = |b: &Box3| usize::from(b.first[2]) < layers.end && usize::from(b.last[2]) >= layers.start;
-        let simplices: Vec<u32> = (self.boxes.par_iter().enumerate().with_min_len(4096))
-            .filter_map(|(s, b)| (!b.is_empty() && meets(b)).then_some(s as u32))
-            .collect();
+        let simplices = self.within(&layers);
         let mut visible = vec![NOTHING; width * height * layers.len()];
-        // Some for each thread, so that none waits for long; but a layer's worth, so that few simplices are in several.
-        let rows = height * layers.len();
-        let tile = rows.div_ceil(4 * rayon::current_num_threads()).min(TILE.div_ceil(width)).max(1);
+        let tile = tile_rows(grid, &layers);
         visible.par_chunks_mut(width * tile).enumerate().try_for_each_init(Vec::new, |bounds, (number, found)| {
             let first = layers.start * height + number * tile;
             let rows = first..first + found.len() / width;
@@ -181,6 +189,14 @@ impl Raster {
     }
 }
 
+/// Rows of a tile: some tiles for each thread, so that none waits for long; but a layer's worth, so that few simplices are in
+/// several.
+pub(super) fn tile_rows(grid: &Grid, layers: &Range<usize>) -> usize {
+    let [width, height, _] = grid.dimensions;
+    let rows = height * layers.len();
+    rows.div_ceil(4 * rayon::current_num_threads()).min(TILE.div_ceil(width)).max(1)
+}
+
 /// Voxels of a tile: what they take of the cache is this times twelve bytes.
 const TILE: usize = 1 << 17;
 
@@ -196,32 +212,48 @@ struct Tile<'a, const D: usize> {
     bounds: &'a mut Vec<(f32, f32)>,
 }
 
-impl<const D: usize> Tile<'_, D> {
-    fn add(&mut self, simplex: u32, frame: &Box3) {
-        let [width, height, _] = self.grid.dimensions;
-        let [first, last] = [&frame.first, &frame.last].map(|b| [0, 1, 2].map(|a| usize::from(b[a])));
-        let layers = first[2].max(self.rows.start / height)..=last[2].min((self.rows.end - 1) / height);
-        // The rows of a layer that are both in the tile and in the box.
-        let rows = self.rows.clone();
-        let shared = |k: usize| {
-            let start = (rows.start.max(k * height) - k * height).max(first[1]);
-            let end = (rows.end.min((k + 1) * height) - k * height).min(last[1] + 1);
-            (start, end)
-        };
-        if layers.clone().all(|k| shared(k).0 >= shared(k).1) {
-            return;
-        }
-        for footprint in Footprint::new(&self.tracer.mesh().corners(simplex), self.lens).iter().flatten() {
-            for k in layers.clone() {
-                let (mut start, mut end) = shared(k);
-                if end.saturating_sub(start) > 16 {
-                    (start, end) = footprint.rows(k, (start, end), width);
-                }
-                for j in start..end {
-                    self.add_row(simplex, footprint, j, k, (first[0], last[0] + 1));
-                }
+/// Calls `row` for each of the image's `rows`, counted through all layers, that a simplex with these corners may cover,
+/// given its box: with its footprint, the row (j, k), and the voxels of the row that are in the box.
+#[inline(always)]
+pub(super) fn each_row<const D: usize>(
+    corners: &[Vector<D>; D],
+    frame: &Box3,
+    lens: &Lens<D>,
+    grid: &Grid,
+    rows: &Range<usize>,
+    mut row: impl FnMut(&Footprint, [usize; 2], (usize, usize)),
+) {
+    let [width, height, _] = grid.dimensions;
+    let [first, last] = [&frame.first, &frame.last].map(|b| [0, 1, 2].map(|a| usize::from(b[a])));
+    let layers = first[2].max(rows.start / height)..=last[2].min((rows.end - 1) / height);
+    // The rows of a layer that are both wanted and in the box.
+    let shared = |k: usize| {
+        let start = (rows.start.max(k * height) - k * height).max(first[1]);
+        let end = (rows.end.min((k + 1) * height) - k * height).min(last[1] + 1);
+        (start, end)
+    };
+    if layers.clone().all(|k| shared(k).0 >= shared(k).1) {
+        return;
+    }
+    for footprint in Footprint::new(corners, lens).iter().flatten() {
+        for k in layers.clone() {
+            let (mut start, mut end) = shared(k);
+            if end.saturating_sub(start) > 16 {
+                (start, end) = footprint.rows(k, (start, end), width);
+            }
+            for j in start..end {
+                row(footprint, [j, k], (first[0], last[0] + 1));
             }
         }
+    }
+}
+
+impl<const D: usize> Tile<'_, D> {
+    fn add(&mut self, simplex: u32, frame: &Box3) {
+        let (corners, rows) = (self.tracer.mesh().corners(simplex), self.rows.clone());
+        each_row(&corners, frame, self.lens, self.grid, &rows, |footprint, [j, k], within| {
+            self.add_row(simplex, footprint, j, k, within);
+        });
     }
 
     #[inline]

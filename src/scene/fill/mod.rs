@@ -24,6 +24,7 @@ mod complex;
 mod kernel;
 mod polygon;
 mod section;
+mod slivers;
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -73,7 +74,7 @@ pub fn fill(
     }
     let frame = Frame::of(points, &triangles);
     let near: Vec<Vector64<3>> = points.iter().map(|point| frame.inwards(point)).collect();
-    let triangles = outward(&near, triangles)?;
+    let triangles = slivers::turned(&near, outward(&near, triangles)?);
     if enclosed_volume(corners(&near, &triangles)) < LEAST * LEAST {
         return Err(nothing().into());
     }

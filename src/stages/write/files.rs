@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Content, Opening, VoxelFile, WritePlan};
+use super::{Content, Format, Opening, VoxelFile, WritePlan};
 use crate::io::Error;
 use crate::render::{Accuracy, Aov};
 use crate::stages::render::RenderPlan;
@@ -18,7 +18,7 @@ pub(in crate::stages) struct PictureFiles {
 struct Open {
     path: PathBuf,
     file: Box<dyn VoxelFile>,
-    /// Where among the aovs its arrays are.
+    /// Where among a slab's arrays its own are.
     places: Vec<usize>,
 }
 
@@ -32,23 +32,47 @@ impl PictureFiles {
         grid: &Grid,
         mesh_hash: &str,
     ) -> Result<Self, Error> {
+        let layers = plan[render].layers;
         let mut aovs: Vec<Aov> = Vec::new();
+        // Each is one array, or one a layer.
         let mut place = |aov: Aov| {
-            aovs.iter().position(|&c| c == aov).unwrap_or_else(|| {
+            let nth = aovs.iter().position(|&c| c == aov).unwrap_or_else(|| {
                 aovs.push(aov);
                 aovs.len() - 1
-            })
+            });
+            let first: usize = aovs[..nth].iter().map(|aov| aov.count(layers)).sum();
+            first..first + aov.count(layers)
         };
         let mut files = Vec::new();
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == render) {
             for file in write.stale(Content::Voxels, stale) {
                 let path = plan.out.join(&file.path);
-                let opened = file.format.open(Opening { path: &path, plan, write, grid, mesh_hash, told })?;
-                let places = file.format.arrays(write).into_iter().map(&mut place).collect();
+                let seen = &plan[render];
+                let opened =
+                    file.format.open(Opening { path: &path, plan, write, render: seen, grid, mesh_hash, told })?;
+                let places = file.format.arrays(write).into_iter().flat_map(&mut place).collect();
                 files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
             }
         }
         Ok(Self { aovs, files })
+    }
+
+    /// Opens the `.vti` of a frame of an animation, below the output folder: the picture of `render`, as `write` says.
+    pub fn frame(
+        file: &Path,
+        write: &WritePlan,
+        render: &RenderPlan,
+        plan: &Plan,
+        told: &str,
+        grid: &Grid,
+        mesh_hash: &str,
+    ) -> Result<Self, Error> {
+        let path = plan.out.join(file);
+        let opened = Format::Vti.open(Opening { path: &path, plan, write, render, grid, mesh_hash, told })?;
+        let aovs = Format::Vti.arrays(write);
+        let places: Vec<usize> = (0..aovs.iter().map(|aov| aov.count(render.layers)).sum()).collect();
+        let open = opened.map(|opened| Open { path: file.to_owned(), file: opened, places });
+        Ok(Self { aovs, files: open.into_iter().collect() })
     }
 
     /// What the files need of each slab, in this order.

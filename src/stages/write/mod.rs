@@ -7,7 +7,7 @@
 mod files;
 mod png;
 mod raw;
-mod vti;
+pub(super) mod vti;
 pub(super) mod vtu;
 
 use std::io::{BufReader, Write};
@@ -21,7 +21,7 @@ use serde_json::{Map, Value, json};
 use super::camera::camera;
 use super::describe::{Counts, Totals, size};
 use super::occlusion;
-use super::render::RenderPlan;
+use super::render::{RenderPlan, array_bytes};
 use super::scene::ScenePlan;
 use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::geometry::{Dimension, Vector};
@@ -59,14 +59,14 @@ trait OutputFormat {
         Vec::new()
     }
 
-    /// Bytes of its numbers a voxel of the image, before compression, for scenes of this dimension.
-    fn voxel_bytes(_write: &WritePlan, _dimension: Dimension) -> u64 {
+    /// Bytes of its numbers a voxel of the image, before compression.
+    fn voxel_bytes(_write: &WritePlan, _image: Image) -> u64 {
         0
     }
 
     /// Bytes a voxel that the disk must have left, as far as they are known before.
-    fn disk_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
-        Self::voxel_bytes(write, dimension)
+    fn disk_bytes(write: &WritePlan, image: Image) -> u64 {
+        Self::voxel_bytes(write, image)
     }
 
     /// Opens a file for a picture's arrays.
@@ -89,8 +89,28 @@ trait OutputFormat {
     }
 }
 
+/// What decides how many numbers a voxel has.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::stages) struct Image {
+    /// The scene's dimension.
+    dimension: Dimension,
+    /// Layers of surfaces.
+    layers: usize,
+}
+
+impl Image {
+    pub(in crate::stages) fn of(plan: &Plan, render: &RenderPlan) -> Self {
+        Self { dimension: plan[render.scene].dimension, layers: render.layers }
+    }
+
+    /// Bytes that a voxel takes in an array, or in those of all layers.
+    fn bytes(self, aov: Aov) -> u64 {
+        array_bytes(aov, self.dimension, self.layers)
+    }
+}
+
 /// Writes the file at the path again, with another text of the pipeline; returns its length.
-type Retell = fn(&Path, &WritePlan, &str) -> Result<u64, Error>;
+pub(in crate::stages) type Retell = fn(&Path, &WritePlan, &str) -> Result<u64, Error>;
 
 /// What is known at the vertices of a mesh.
 #[derive(Clone, Copy, Debug, Default)]
@@ -106,6 +126,8 @@ struct Opening<'a> {
     path: &'a Path,
     plan: &'a Plan,
     write: &'a WritePlan,
+    /// The picture's render; of a frame of an animation the one that has its camera.
+    render: &'a RenderPlan,
     grid: &'a Grid,
     mesh_hash: &'a str,
     told: &'a str,
@@ -135,7 +157,8 @@ macro_rules! formats {
             /// The render, by its id.
             pub input: Option<String>,
             $($(#[$doc])+ pub $key: Option<String>,)+
-            /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`); `bent_normal` is also put into the `.vtu`.
+            /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`; also `coverage` where light passes objects,
+            /// and of a render with `layers` all arrays of layers). `bent_normal` is also put into the `.vtu`.
             pub arrays: Option<Vec<Aov>>,
             /// How the `.vti` stores numbers (default `appended`).
             pub encoding: Option<Encoding>,
@@ -177,19 +200,19 @@ macro_rules! formats {
                 match self { $(Self::$name => <$key::$name>::TELLS_PIPELINE),+ }
             }
 
-            fn voxel_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
-                match self { $(Self::$name => <$key::$name>::voxel_bytes(write, dimension)),+ }
+            pub(in crate::stages) fn voxel_bytes(self, write: &WritePlan, image: Image) -> u64 {
+                match self { $(Self::$name => <$key::$name>::voxel_bytes(write, image)),+ }
             }
 
-            fn disk_bytes(self, write: &WritePlan, dimension: Dimension) -> u64 {
-                match self { $(Self::$name => <$key::$name>::disk_bytes(write, dimension)),+ }
+            pub(in crate::stages) fn disk_bytes(self, write: &WritePlan, image: Image) -> u64 {
+                match self { $(Self::$name => <$key::$name>::disk_bytes(write, image)),+ }
             }
 
             fn open(self, file: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
                 match self { $(Self::$name => <$key::$name>::open(file)),+ }
             }
 
-            fn retell(self) -> Option<Retell> {
+            pub(in crate::stages) fn retell(self) -> Option<Retell> {
                 match self { $(Self::$name => <$key::$name>::RETELL),+ }
             }
 
@@ -305,6 +328,11 @@ impl WritePlan {
         self.arrays_given && self.arrays.contains(&Aov::BentNormal)
     }
 
+    /// The names of the arrays that its image data hold, in that order.
+    pub fn array_names(&self, plan: &Plan) -> Vec<String> {
+        self.arrays.iter().flat_map(|aov| aov.names(plan[self.render].layers)).collect()
+    }
+
     /// The files with this content that have to be made.
     pub(super) fn stale(&self, content: Content, stale: &dyn Fn(&Path) -> bool) -> Vec<&WriteFile> {
         self.files.iter().filter(|file| file.format.content() == content && stale(&file.path)).collect()
@@ -318,8 +346,10 @@ const MESH_LEFT_OUT: &[LeftOut] = &[
     LeftOut::new("/denoise", "a mesh has no voxels"),
     LeftOut::new("/tolerance", "a mesh has no voxels"),
     LeftOut::new("/supersample", "a mesh has no voxels"),
+    LeftOut::new("/layers", "a mesh has no voxels"),
     LeftOut::new("/dilate", "a mesh has no voxels"),
     LeftOut::new("/lighting", "a mesh is not lit"),
+    LeftOut::new("/screen_space", "a mesh is not looked at in an image"),
 ];
 
 impl Stage for WritePlan {
@@ -351,27 +381,7 @@ impl Stage for WritePlan {
             let keys: Vec<&str> = Format::ALL.iter().map(|format| format.key()).collect();
             return Err(Invalid::new(path, format!("names no file; give at least one of {}", keys.join(", "))));
         }
-        let arrays = match &spec.arrays {
-            None => vec![Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity],
-            Some(arrays) => arrays.clone(),
-        };
-        if arrays.is_empty() {
-            return Err(Invalid::new(format!("{path}.arrays"), "the list is empty; name at least one array"));
-        }
-        for (i, array) in arrays.iter().enumerate() {
-            if arrays[..i].contains(array) {
-                return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.name())));
-            }
-            if *array == Aov::Light && resolver.plan[render].lighting.is_none() {
-                let id = resolver.plan.id(render);
-                let message =
-                    format!("render `{id}` is not lit; give it `lights`, `ambient`, `sky`, `bounce` or `depth_cue`");
-                return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
-            }
-            if let Some(message) = refusal(*array, &resolver.plan, render) {
-                return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
-            }
-        }
+        let arrays = arrays(spec.arrays.as_deref(), path, render, resolver)?;
         let has_vtu = files.get(Format::Vtu).is_some();
         if files.get(Format::Vti).is_none() {
             let given = [
@@ -446,9 +456,9 @@ impl Stage for WritePlan {
 
     fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
         let write = &plan[me];
-        let dimension = plan[plan[write.render].scene].dimension;
-        let voxel = write.files.iter().filter(|file| stale(&file.path)).map(|f| f.format.disk_bytes(write, dimension));
-        Needs { memory: 0, disk: plan[write.render].voxels().saturating_mul(voxel.sum()) }
+        let image = Image::of(plan, &plan[write.render]);
+        let voxel = write.files.iter().filter(|file| stale(&file.path)).map(|f| f.format.disk_bytes(write, image));
+        Needs { disk: plan[write.render].voxels().saturating_mul(voxel.sum()), ..Needs::default() }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, counts: &[Counts]) -> String {
@@ -465,8 +475,8 @@ impl Stage for WritePlan {
 
     fn totals(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> Totals {
         let write = &plan[me];
-        let dimension = plan[plan[write.render].scene].dimension;
-        let voxel: u64 = write.files.iter().map(|file| file.format.voxel_bytes(write, dimension)).sum();
+        let image = Image::of(plan, &plan[write.render]);
+        let voxel: u64 = write.files.iter().map(|file| file.format.voxel_bytes(write, image)).sum();
         Totals { bytes: plan[write.render].voxels().saturating_mul(voxel), ..Totals::default() }
     }
 
@@ -515,12 +525,54 @@ impl Stage for WritePlan {
 /// Why a render can't have this array, if so.
 fn refusal(array: Aov, plan: &Plan, render: Ref<RenderPlan>) -> Option<String> {
     match array {
-        Aov::BentNormal => plan[render].occlusion.and_then(|occlusion| plan[occlusion].no_directions()),
+        Aov::BentNormal => plan[render].no_directions(plan),
         Aov::Bounce | Aov::BounceError if !plan[render].lighting.as_ref().is_some_and(|lighting| lighting.bounce) => {
             Some(format!("render `{}` follows no light from surface to surface; give it `bounce: 1`", plan.id(render)))
         }
         _ => None,
     }
+}
+
+/// The arrays that a `.vti` of a render holds, checked.
+pub(super) fn arrays(
+    given: Option<&[Aov]>,
+    path: &str,
+    render: Ref<RenderPlan>,
+    resolver: &Resolver,
+) -> Result<Vec<Aov>, Invalid> {
+    let layers = resolver.plan[render].layers;
+    let usual = || {
+        // Of what light passes, figures show where something is.
+        let plan = &resolver.plan;
+        let coverage = plan[plan[render].scene].is_translucent().then_some(&Aov::Coverage);
+        let of_layers = Aov::ALL.iter().filter(|aov| layers > 0 && aov.needs_layers());
+        let usual = [Aov::Rgba, Aov::AmbientOcclusion, Aov::Opacity];
+        usual.iter().chain(coverage).chain(of_layers).copied().collect()
+    };
+    let arrays = given.map_or_else(usual, <[Aov]>::to_vec);
+    if arrays.is_empty() {
+        return Err(Invalid::new(format!("{path}.arrays"), "the list is empty; name at least one array"));
+    }
+    for (i, array) in arrays.iter().enumerate() {
+        if arrays[..i].contains(array) {
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), format!("`{}` stands twice", array.name())));
+        }
+        if array.is_layered() && layers == 0 {
+            let (id, name) = (resolver.plan.id(render), array.name());
+            let message = format!("render `{id}` has no layers for `{name}`; give it `layers`, as many as are wanted");
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
+        }
+        if *array == Aov::Light && resolver.plan[render].lighting.is_none() {
+            let id = resolver.plan.id(render);
+            let message =
+                format!("render `{id}` is not lit; give it `lights`, `ambient`, `sky`, `bounce` or `depth_cue`");
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
+        }
+        if let Some(message) = refusal(*array, &resolver.plan, render) {
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
+        }
+    }
+    Ok(arrays)
 }
 
 /// Copies a file to one that takes its place when it is whole: `copy` is given both. Returns its length.

@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::{Content, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
-use crate::geometry::Dimension;
+use super::{Content, Image, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
 use crate::io::raw::RawWriter;
 use crate::io::{AtomicFile, Error};
 use crate::render::Aov;
-use crate::stages::render::array_bytes;
 use crate::volume::{Array, Values};
 
 pub(super) struct Raw;
@@ -24,8 +22,8 @@ impl OutputFormat for Raw {
         vec![Aov::Rgb]
     }
 
-    fn voxel_bytes(_: &WritePlan, dimension: Dimension) -> u64 {
-        array_bytes(Aov::Rgb, dimension)
+    fn voxel_bytes(_: &WritePlan, image: Image) -> u64 {
+        image.bytes(Aov::Rgb)
     }
 
     fn open(Opening { path, grid, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {

@@ -5,7 +5,8 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{
-    Compression, Content, Encoding, LeftOut, Opening, OutputFormat, PROGRAM, Retell, VoxelFile, WritePlan, copy_over,
+    Compression, Content, Encoding, Image, LeftOut, Opening, OutputFormat, PROGRAM, Retell, VoxelFile, WritePlan,
+    copy_over,
 };
 use crate::geometry::Dimension;
 use crate::io::vti::{self, ArraySpec, VtiWriter};
@@ -13,7 +14,8 @@ use crate::io::{AtomicFile, Error, PIPELINE};
 use crate::render::{Accuracy, Aov};
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
-use crate::stages::render::array_bytes;
+use crate::stages::render::RenderPlan;
+use crate::stages::screen_space::WORD;
 use crate::volume::Array;
 
 pub(super) struct Vti;
@@ -27,14 +29,14 @@ impl OutputFormat for Vti {
         write.arrays.clone()
     }
 
-    fn voxel_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
-        write.arrays.iter().map(|&channel| array_bytes(channel, dimension)).sum()
+    fn voxel_bytes(write: &WritePlan, image: Image) -> u64 {
+        write.arrays.iter().map(|&aov| image.bytes(aov)).sum()
     }
 
     /// How far compression gets is not known before, so compressed files count as nothing, and are refused by the
     /// disk itself if it comes to that.
-    fn disk_bytes(write: &WritePlan, dimension: Dimension) -> u64 {
-        let arrays = Self::voxel_bytes(write, dimension);
+    fn disk_bytes(write: &WritePlan, image: Image) -> u64 {
+        let arrays = Self::voxel_bytes(write, image);
         match (write.compression, write.encoding) {
             (Compression::None, Encoding::Appended) => arrays,
             // Four bytes of text for three, and the arrays themselves, which are kept aside until all are whole.
@@ -48,11 +50,11 @@ impl OutputFormat for Vti {
     });
 
     fn open(
-        Opening { path, plan, write, grid, mesh_hash, told }: Opening,
+        Opening { path, plan, write, render, grid, mesh_hash, told }: Opening,
     ) -> Result<Option<Box<dyn VoxelFile>>, Error> {
-        let dimension = plan[plan[write.render].scene].dimension;
-        let specs: Vec<ArraySpec> = write.arrays.iter().map(|&channel| array_spec(channel, dimension)).collect();
-        let settings = settings(plan, write, mesh_hash, told, path.parent());
+        let image = Image::of(plan, render);
+        let specs: Vec<ArraySpec> = write.arrays.iter().flat_map(|&aov| array_specs(aov, image)).collect();
+        let settings = settings(plan, write, render, mesh_hash, told, path.parent());
         let out = AtomicFile::create(path)?;
         let writer = VtiWriter::new(out, grid, &specs, &settings).map_err(AtomicFile::name_in(path))?;
         Ok(Some(Box::new(File { path: path.to_owned(), writer })))
@@ -83,12 +85,12 @@ impl VoxelFile for File {
     }
 }
 
-fn array_spec(aov: Aov, dimension: Dimension) -> ArraySpec {
-    let components = match dimension {
+fn array_specs(aov: Aov, image: Image) -> impl Iterator<Item = ArraySpec> {
+    let components = match image.dimension {
         Dimension::Three => aov.components::<3>(),
         Dimension::Four => aov.components::<4>(),
     };
-    ArraySpec::new(aov.name(), aov.kind(), components)
+    aov.names(image.layers).into_iter().map(move |name| ArraySpec::new(&name, aov.kind(), components))
 }
 
 /// How far off the occlusion is, as files say it: the root mean square, the most that some voxel was off, and how many
@@ -96,6 +98,11 @@ fn array_spec(aov: Aov, dimension: Dimension) -> ArraySpec {
 fn numbers(accuracy: &Accuracy) -> [(&'static str, f64); 3] {
     let Accuracy { rms, largest, voxels } = *accuracy;
     [("occlusion_rms_error", rms), ("occlusion_largest_error", largest), ("occlusion_voxels_checked", voxels as f64)]
+}
+
+/// Puts another text of the pipeline into a file whose arrays are appended.
+pub(in crate::stages) fn retell(path: &Path, text: &str) -> Result<u64, Error> {
+    copy_over(path, |source, out| vti::retell(source, out, vti::Encoding::Appended, (PIPELINE, text)))
 }
 
 fn encoding(write: &WritePlan) -> vti::Encoding {
@@ -106,25 +113,35 @@ fn encoding(write: &WritePlan) -> vti::Encoding {
 }
 
 /// What a `.vti` says about itself, and how; `scratch` is the folder for what has to be kept aside.
-fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, told: &str, scratch: Option<&Path>) -> vti::Settings {
-    let render = &plan[write.render];
+fn settings(
+    plan: &Plan,
+    write: &WritePlan,
+    render: &RenderPlan,
+    mesh_hash: &str,
+    told: &str,
+    scratch: Option<&Path>,
+) -> vti::Settings {
     let scene = &plan[render.scene];
     let occlusion = render.occlusion.map(|o| match &plan[o].source {
         OcclusionSource::Compute(computation) => computation.told(),
         OcclusionSource::Load(_) => json!("loaded"),
     });
-    let settings = json!({
+    let occlusion = occlusion.or_else(|| render.screen_space.as_ref().map(|space| json!({ WORD: space.written() })));
+    let mut settings = json!({
         "seed": plan.seed,
         "scene": { "dimension": scene.dimension, "mesh": mesh_hash },
         "occlusion": occlusion,
         "camera": render.camera,
         "dimensions": render.dimensions,
-        "shading": render.shading,
+        "shading": render.screen_space.is_none().then_some(render.shading),
         "denoise": render.denoise,
         "tolerance": render.tolerance,
         "supersample": render.supersample,
         "dilate": render.dilate,
     });
+    if render.layers > 0 {
+        settings["layers"] = render.layers.into();
+    }
     vti::Settings {
         encoding: encoding(write),
         compression: match write.compression {
@@ -138,7 +155,7 @@ fn settings(plan: &Plan, write: &WritePlan, mesh_hash: &str, told: &str, scratch
             ("settings".to_owned(), settings.to_string()),
         ],
         // Known when the picture is there; 0 of 0 voxels if it shows nothing.
-        numbers: match render.occlusion.and_then(|occlusion| plan[occlusion].audit()) {
+        numbers: match render.audit(plan) {
             Some(_) => numbers(&Accuracy::default()).map(|(name, number)| (name.to_owned(), number)).into(),
             None => Vec::new(),
         },

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Error, Estimate, RayBackend, Sampling, ShadingPoint, Target};
+use super::{Error, Estimate, RayBackend, Sampling, ShadingPoint, Target, translucent};
 use crate::accel::Tracer;
 use crate::geometry::Ray;
 use crate::progress::Progress;
@@ -61,6 +61,9 @@ impl<const D: usize> RayBackend<D> for CpuBackend<D> {
         sampling: &Sampling,
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>, Error> {
+        if self.tracer.mesh().is_translucent() {
+            return Ok(translucent::open_fractions(&self.tracer, points, sampling, progress)?);
+        }
         self.tracer.prepare_wide();
         let usual = sampling.target.map_or(sampling.samples, |_| Target::FEWEST.min(sampling.samples));
         let batch = (BATCH_RAYS / usual.max(1) as usize).clamp(1, 64);

@@ -8,7 +8,7 @@ use crate::accel::Tracer;
 use crate::geometry::{Dimension, Ray};
 use crate::progress::{Cancelled, Progress};
 use crate::trace::estimate::{Accumulator, Estimate};
-use crate::trace::{Error, NOTHING, RayBackend, Sampling, Sequence, ShadingPoint, Surroundings};
+use crate::trace::{Error, NOTHING, RayBackend, Sampling, Sequence, ShadingPoint, Surroundings, translucent};
 
 /// Rays between two looks at whether to go on: some milliseconds, in very large scenes a tenth of a second.
 pub(super) const RAYS_BETWEEN_LOOKS: u32 = 1 << 10;
@@ -24,6 +24,9 @@ pub fn estimate_at<const D: usize>(
     sampling: &Sampling,
     progress: &dyn Progress,
 ) -> Result<Estimate, Cancelled> {
+    if tracer.mesh().is_translucent() {
+        return translucent::estimate_at(tracer, point, sampling, progress);
+    }
     let surroundings = Surroundings::of(tracer, point);
     if surroundings.normal.amax() == 0.0 {
         return Ok(Estimate::known(1.0));

@@ -273,6 +273,10 @@ impl<const D: usize> RayBackend<D> for OpenClBackend<D> {
         sampling: &Sampling,
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>, TraceError> {
+        // Devices know of rays that escape, not of shares of them.
+        if self.tracer.mesh().is_translucent() {
+            return CpuBackend::new(Arc::clone(&self.tracer)).open_fractions(points, sampling, progress);
+        }
         self.estimate(points, sampling, progress)
     }
 

@@ -13,6 +13,8 @@ pub(super) struct Page<'a> {
     pub height: usize,
     /// Numbers at each point.
     pub samples: usize,
+    /// Whether they lie one behind the other, not side by side.
+    pub planar: bool,
     /// How many pages there are.
     pub count: usize,
     /// Distances between points along x and y, where the resolution says it.
@@ -174,9 +176,10 @@ impl Layout {
             .as_array()
             .map(|sizes| sizes.iter().map(|n| n.as_u64().map_or(0, |n| n as usize)).collect())
             .unwrap_or_default();
-        let samples = usize::from(page.samples > 1 && shape.last() == Some(&page.samples));
+        let within = shape.len().checked_sub(if page.planar { 3 } else { 1 }).and_then(|at| shape.get(at));
+        let samples = usize::from(page.samples > 1 && within == Some(&page.samples));
         let planes = shape.len().saturating_sub(2 + samples);
-        let inner = &shape[planes..];
+        let inner = &shape[planes + if page.planar { samples } else { 0 }..];
         if shape.len() < 2 + samples || [inner[1], inner[0]] != [page.width, page.height] {
             let message = format!(
                 "its description gives the shape {shape:?}, whose last two are not its pages' {} rows of {} points; \
@@ -238,6 +241,17 @@ impl Layout {
                 .find(|node| [node.attribute("Name"), node.attribute("ID")].contains(&Some(name.as_str())))
                 .ok_or_else(|| wrong(format!("has no image \"{name}\"; there are {}", titles())))?,
             (None, [one]) => one,
+            (None, []) => {
+                let other = document.descendants().find_map(|node| node.attribute("MetadataFile"));
+                return Err(other.map_or_else(
+                    || wrong("has no image".into()),
+                    |file| {
+                        format!(
+                            "unsupported: its OME-XML is in another file, {file}; save both as one: bfconvert {file} OUT.ome.tif"
+                        )
+                    },
+                ));
+            }
             (None, all) => return Err(wrong(format!("has {} images; give array, one of {}", all.len(), titles()))),
         };
         let pixels =
@@ -319,11 +333,9 @@ impl Layout {
         document: &roxmltree::Document,
         pixels: roxmltree::Node,
     ) -> Result<(), String> {
+        // A file that is one of several says so by its planes' files; which is looked at before they are counted.
         let planes = self.planes();
-        if planes > page.count {
-            return Err(format!("its OME-XML says {planes} planes, and it has {} pages", page.count));
-        }
-        let mut pages: Vec<Option<usize>> = vec![None; planes];
+        let mut pages: Vec<Option<usize>> = vec![None; planes.min(page.count)];
         let mut any = false;
         let own = document.root_element().attribute("UUID");
         for data in pixels.children().filter(|node| node.is_element() && node.tag_name().name() == "TiffData") {
@@ -354,6 +366,9 @@ impl Layout {
                     *slot = Some(first_page.saturating_add(i));
                 }
             }
+        }
+        if planes > page.count {
+            return Err(format!("its OME-XML says {planes} planes, and it has {} pages", page.count));
         }
         if any {
             self.pages = pages

@@ -66,6 +66,7 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
         width: width as usize,
         height: height as usize,
         samples,
+        planar,
         count: directories.count,
         resolution,
         description: &description,

@@ -1,6 +1,6 @@
 //! What is asked: which rays from a point hit a mesh.
 
-use super::directions::Rays;
+use super::directions::{BLOCK, Rays};
 use crate::accel::{Tracer, WideBvh};
 use crate::geometry::{Ray, Vector};
 
@@ -31,6 +31,17 @@ impl<'t, const D: usize> Query<'t, D> {
     /// A ray of a block, for exact arithmetic.
     pub fn ray(&self, rays: &Rays<D>, i: usize) -> Ray<D> {
         Ray::new(self.position, Vector::from_fn(|k, _| rays.direction[k][i]))
+    }
+
+    /// Which of the rays `alive` hit what lies apart.
+    pub fn hits_far(&self, rays: &Rays<D>, alive: u64) -> u64 {
+        let Self { tracer, limit, ignored, .. } = *self;
+        let far = &self.wide.far;
+        let hits = |i: &usize| {
+            let ray = self.ray(rays, *i);
+            far.any(&ray, limit, |simplex| !ignored.contains(&simplex) && tracer.hits(simplex, &ray, limit))
+        };
+        (0..BLOCK).filter(|i| alive >> i & 1 == 1).filter(hits).fold(0, |found, i| found | 1 << i)
     }
 
     /// The limit in the coordinates of the boxes, and a little more.

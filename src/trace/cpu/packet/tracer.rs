@@ -85,13 +85,17 @@ impl<const D: usize> PacketTracer<D> {
         if normal.amax() == 0.0 {
             return Ok(Estimate::known(1.0));
         }
-        if !tracer.wide().serves(&position) {
+        let around = match *point {
+            ShadingPoint::Vertex(vertex) => tracer.incidence().around(mesh.identity[vertex as usize]),
+            ShadingPoint::Inside { .. } => &[],
+        };
+        let is_served = !mesh.is_translucent() && tracer.wide().serves(&position) && tracer.wide().holds(around, mesh);
+        if !is_served {
             return estimate_at(tracer, point, sampling, progress);
         }
         let vertex = match *point {
             ShadingPoint::Vertex(vertex) => {
                 let identity = mesh.identity[vertex as usize];
-                let around = tracer.incidence().around(identity);
                 Some(AtVertex { ways: [normal, approach(mesh, around, vertex)], identity, around })
             }
             ShadingPoint::Inside { .. } => None,
@@ -210,7 +214,10 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
         let alive = u64::MAX >> (BLOCK - count);
         let hidden = packets.star.hidden::<L>(query, &packets.rays, around, alive);
         let hit = packets.traversal.blocked::<L>(query, &packets.rays, alive & !hidden);
-        let open = alive & !(hidden | hit);
+        let mut open = alive & !(hidden | hit);
+        if !query.wide.far.nodes.is_empty() {
+            open &= !query.hits_far(&packets.rays, open);
+        }
         accumulator.add(if accumulator.is_fine() { packets.rays.in_sequence(open) } else { open }, count as u32);
         if let Source::Sequence { target: Some(target), .. } = &source
             && target.is_met(&accumulator)

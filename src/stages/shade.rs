@@ -1,0 +1,345 @@
+//! `shade`: ambient occlusion for an image that is there already, of which no scene is known.
+//!
+//! A `.vti` of whatever program, with the distance from the eye and the normal of what each voxel shows, is written again
+//! with `ambient_occlusion`, looked for in screen space ([`crate::render::screen_space`]). The camera is what the image
+//! tells itself, as those of `ao4d run` do, or what the pipeline says. An image that tells its camera may have been cut
+//! out of a larger one: its grid says where it lies. Of another all is taken to be there, as a render with that camera makes
+//! it.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::camera::{self, CameraPlan, CameraSpec};
+use super::describe::{Counts, grouped};
+use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
+use super::write::{PROGRAM, vti as picture};
+use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, Stage, StageError};
+use crate::geometry::{Dimension, Vector};
+use crate::io::{self, AtomicFile, PIPELINE, vti, vtk};
+use crate::occlusion::Cancelled;
+use crate::progress::Progress;
+use crate::render::DepthImage;
+use crate::volume::{Array, Volume};
+
+/// The array that it adds.
+const OCCLUSION: &str = "ambient_occlusion";
+/// What images of `ao4d run` tell of how they were made.
+const SETTINGS: &str = "settings";
+
+/// Ambient occlusion for an image that is there already.
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct ShadeSpec {
+    /// A name for later stages to refer to.
+    pub id: Option<String>,
+    /// The image: a `.vti` with a distance from the eye and a normal for each point, relative to the pipeline's folder.
+    pub image: String,
+    /// The camera that it was seen by (default: the one that the image tells, if `ao4d` made it).
+    pub camera: Option<CameraSpec>,
+    /// With `camera`: the dimension of the scene that is shown, 4 (default) or 3.
+    #[schemars(range(min = 3, max = 4))]
+    pub dimension: Option<u64>,
+    /// The array of distances from the eye (default `depth`); a point whose distance is not above 0, or infinite, shows
+    /// nothing.
+    pub depth: Option<String>,
+    /// The array of normals, as many numbers a point as the scene has dimensions (default `normal`).
+    pub normal: Option<String>,
+    /// How ambient occlusion is looked for.
+    pub screen_space: Option<ScreenSpaceSpec>,
+    /// The file: `NAME.vti`, with all that the image has, and `ambient_occlusion`.
+    pub vti: String,
+}
+
+/// Ambient occlusion for an image that is there already, as understood.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ShadePlan {
+    /// The image, which existed when the plan was made.
+    #[serde(serialize_with = "super::describe::path")]
+    pub image: PathBuf,
+    /// The camera, if the pipeline says which.
+    pub camera: Option<CameraPlan>,
+    /// The array of distances.
+    pub depth: String,
+    /// The array of normals.
+    pub normal: String,
+    /// How occlusion is looked for.
+    pub screen_space: ScreenSpacePlan,
+    /// The file, below `out`.
+    #[serde(serialize_with = "super::describe::path")]
+    pub file: PathBuf,
+}
+
+impl Stage for ShadePlan {
+    type Spec = ShadeSpec;
+    const KIND: &'static str = "shade";
+    const LIST: &'static str = "shades";
+    const LEFT_OUT: &'static [LeftOut] = &[
+        LeftOut::new("/image", "the content of the file takes part"),
+        LeftOut::new("/file", "a file doesn't depend on its name"),
+    ];
+
+    fn id(spec: &ShadeSpec) -> Option<&str> {
+        spec.id.as_deref()
+    }
+
+    fn resolve(spec: &ShadeSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
+        let (key, image) = (format!("{path}.image"), resolver.plan.folder.join(&spec.image));
+        match crate::input::length(&image) {
+            Ok(_) if !spec.image.is_empty() => {}
+            Err(cause) if image.exists() => {
+                return Err(Invalid::new(key, format!("can't read {}: {cause}", image.display())));
+            }
+            _ => return Err(Invalid::new(key, format!("there is no file {}", image.display()))),
+        }
+        let camera = match (&spec.camera, spec.dimension) {
+            (None, None) => None,
+            (None, Some(_)) => {
+                resolver.warn(format!("{path}.dimension"), "has no effect without `camera`: the image tells its own");
+                None
+            }
+            (Some(camera), dimension) => {
+                let number = dimension.unwrap_or(4);
+                let dimension = Dimension::new(number).ok_or_else(|| {
+                    Invalid::new(format!("{path}.dimension"), format!("expected 3 or 4, found {number}"))
+                })?;
+                Some(camera::plan(camera, &format!("{path}.camera"), dimension, &mut resolver.plan.warnings)?)
+            }
+        };
+        let name = |given: &Option<String>, default: &str| given.as_deref().unwrap_or(default).to_owned();
+        let screen_space = screen_space::plan(spec.screen_space.as_ref(), &format!("{path}.screen_space"))?;
+        let file = resolver.outputs.claim(&format!("{path}.vti"), &spec.vti, Some("vti"))?;
+        let (depth, normal) = (name(&spec.depth, "depth"), name(&spec.normal, "normal"));
+        Ok(Self { image, camera, depth, normal, screen_space, file })
+    }
+
+    fn works_on(&self) -> Vec<usize> {
+        Vec::new()
+    }
+
+    fn scene(_: Ref<Self>, _: &Plan) -> Option<Ref<super::scene::ScenePlan>> {
+        None
+    }
+
+    fn input_files(&self, _: &Plan) -> Vec<PathBuf> {
+        std::iter::once(self.image.clone()).chain(vtk::piece_files(&self.image)).collect()
+    }
+
+    fn check_inputs(me: Ref<Self>, plan: &Plan) -> Result<(), Invalid> {
+        plan[me].read().map(drop).map_err(|message| Invalid::new(format!("{}.image", plan.path(me)), message))
+    }
+
+    fn files(&self) -> Vec<&Path> {
+        vec![&self.file]
+    }
+
+    fn outputs(me: Ref<Self>, plan: &Plan, keys: &Keys) -> Vec<Output> {
+        let file = plan[me].file.clone();
+        vec![Output { beside: Vec::new(), key: keys.of(me.index()).to_owned(), tells: Some(file.clone()), file }]
+    }
+
+    fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
+        picture::retell(&plan.out.join(output), text)
+    }
+
+    fn written(me: Ref<Self>, plan: &Plan) -> Value {
+        let Self { camera, depth, normal, screen_space, .. } = &plan[me];
+        let mut written = json!({ "depth": depth, "normal": normal, "screen_space": screen_space.written() });
+        if let Some(camera) = camera {
+            (written["camera"], written["dimension"]) = (camera.written(), camera.eye.len().into());
+        }
+        written
+    }
+
+    /// The file and the arrays in it are in memory at once.
+    fn needs(me: Ref<Self>, plan: &Plan, stale: &dyn Fn(&Path) -> bool) -> Needs {
+        let Self { image, file, .. } = &plan[me];
+        let bytes = if stale(file) { crate::input::length(image).unwrap_or(0) } else { 0 };
+        Needs { memory: bytes.saturating_mul(2), disk: bytes, holds: "its image" }
+    }
+
+    fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
+        let Self { image, screen_space, file, .. } = &plan[me];
+        let name = image.file_name().unwrap_or_default().to_string_lossy();
+        format!("{name}, screen space, {} -> {}", screen_space.line(), file.display())
+    }
+
+    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
+        let (plan, shade) = (run.plan, &run.plan[me]);
+        if !run.is_stale(&shade.file) {
+            return Ok("as it was".to_owned());
+        }
+        // It was read before, but may have changed since.
+        let image = shade.read().map_err(|message| Invalid::new(format!("{}.image", plan.path(me)), message))?;
+        let running = run.progress.stage(&format!("shade {}", plan.id(me)), image.volume.grid.len() as u64);
+        let found = match image.dimension {
+            Dimension::Three => shade.occlusion::<3>(&image, run.progress),
+            Dimension::Four => shade.occlusion::<4>(&image, run.progress),
+        }?;
+        running.end();
+        let mut notes = Vec::new();
+        if found.seen == 0 {
+            notes.push(format!(
+                "{}: no point of the image shows anything; `{}` has no distance above 0",
+                plan.id(me),
+                shade.depth
+            ));
+        }
+        if found.without_normal > 0 {
+            notes.push(format!(
+                "{}: {} of the {} points that show something have no normal, and are left open",
+                plan.id(me),
+                grouped(found.without_normal),
+                grouped(found.seen)
+            ));
+        }
+        let seen = format!("{} of {} points show something", grouped(found.seen), grouped(found.values.len() as u64));
+        let bytes = shade.write(&plan.out.join(&shade.file), run.told, image, found.values)?;
+        run.made(&shade.file, bytes, notes)?;
+        Ok(seen)
+    }
+}
+
+/// An image that can be shaded.
+struct Image {
+    volume: Volume,
+    time: Option<f64>,
+    dimension: Dimension,
+    camera: CameraPlan,
+}
+
+/// Ambient occlusion of an image's points.
+struct Found {
+    values: Vec<f32>,
+    /// Points that show something, and those of them that have no normal.
+    seen: u64,
+    without_normal: u64,
+}
+
+impl ShadePlan {
+    /// Reads the image; what is wrong with it, or what it lacks, otherwise.
+    fn read(&self) -> Result<Image, String> {
+        let name = self.image.display().to_string();
+        let unusable = |cause: String| format!("can't use {name}: {cause}");
+        let read = vtk::read(&self.image).map_err(|error| error.to_string())?;
+        let vtk::DataSet::Image(image) = read else {
+            return Err(unusable("it holds a mesh, not an image".to_owned()));
+        };
+        let time = image.time();
+        let volume = image.into_volume().map_err(|problem| unusable(problem.to_string()))?;
+        let told = self.camera.clone().map_or_else(|| told_camera(&volume), |camera| Some(Ok(camera)));
+        let mut lacks = Vec::new();
+        let (depth, normal) = (volume.array(&self.depth), volume.array(&self.normal));
+        if depth.is_none() {
+            lacks.push(format!("the array `{}` (distances from the eye)", self.depth));
+        }
+        if normal.is_none() {
+            lacks.push(format!("the array `{}` (normals)", self.normal));
+        }
+        if told.is_none() {
+            lacks.push("a camera in its field data (give one by `camera`)".to_owned());
+        }
+        let (Some(depth), Some(normal), Some(camera)) = (depth, normal, told) else {
+            let has: Vec<&str> = volume.arrays.iter().map(|array| array.name.as_str()).collect();
+            let has = if has.is_empty() { "no arrays".to_owned() } else { has.join(", ") };
+            return Err(unusable(format!("it lacks {}; it has {has}", lacks.join(" and "))));
+        };
+        let camera = camera.map_err(unusable)?;
+        if depth.components != 1 {
+            let count = depth.components;
+            return Err(unusable(format!(
+                "its array `{}` has {count} numbers a point, and distances have 1",
+                self.depth
+            )));
+        }
+        let Some(dimension) = Dimension::new(normal.components as u64) else {
+            let count = normal.components;
+            return Err(unusable(format!(
+                "its array `{}` has {count} numbers a point, and normals have 3 or 4",
+                self.normal
+            )));
+        };
+        if camera.eye.len() != dimension.get() {
+            let (own, needed) = (camera.eye.len(), dimension.get());
+            let remedy = if self.camera.is_some() { format!("; say `dimension: {needed}`") } else { String::new() };
+            return Err(unusable(format!("its normals are of a {needed}D scene, and the camera is {own}D{remedy}")));
+        }
+        let layers = volume.grid.dimensions[2];
+        if dimension == Dimension::Three && layers > 1 {
+            return Err(unusable(format!(
+                "its normals are of a 3D scene, whose image has one layer, and it has {layers}"
+            )));
+        }
+        Ok(Image { time, dimension, camera, volume })
+    }
+
+    /// The occlusion of all points.
+    fn occlusion<const D: usize>(&self, image: &Image, progress: &dyn Progress) -> Result<Found, StageError> {
+        let camera = camera::camera::<D>(&image.camera)?;
+        let own = &image.volume.grid;
+        let grid = if self.camera.is_some() { camera.grid(own.dimensions) } else { *own };
+        let numbers = |name: &str| image.volume.array(name).map(|array| &array.values);
+        let (Some(depth), Some(normals)) = (numbers(&self.depth), numbers(&self.normal)) else {
+            return Ok(Found { values: Vec::new(), seen: 0, without_normal: 0 });
+        };
+        let distances: Vec<f32> = (0..grid.len()).into_par_iter().map(|n| depth.get(n) as f32).collect();
+        let depth_image = DepthImage::<D>::new(&camera, &grid, distances, self.screen_space.settings());
+        let mut found: Vec<Option<Option<f32>>> = vec![None; grid.len()];
+        let width = grid.dimensions[0];
+        found.par_chunks_mut(width).enumerate().try_for_each(|(row, found)| {
+            if progress.cancelled() {
+                return Err(Cancelled);
+            }
+            for (i, found) in found.iter_mut().enumerate() {
+                let n = row * width + i;
+                if depth_image.shows(n) {
+                    let normal = Vector::<D>::from_fn(|r, _| normals.get(D * n + r) as f32);
+                    *found = Some(depth_image.occlusion_at(&normal, grid.index(n)));
+                }
+            }
+            progress.advance(width as u64);
+            Ok(())
+        })?;
+        Ok(Found {
+            seen: found.iter().flatten().count() as u64,
+            without_normal: found.iter().flatten().filter(|value| value.is_none()).count() as u64,
+            values: found.into_iter().map(|value| value.flatten().unwrap_or(1.0)).collect(),
+        })
+    }
+
+    /// Writes the image with its occlusion; returns the file's length.
+    fn write(&self, path: &Path, told: &str, image: Image, values: Vec<f32>) -> Result<u64, io::Error> {
+        let Image { mut volume, time, .. } = image;
+        let replaced = volume.array(OCCLUSION).is_some();
+        volume.arrays.retain(|array| array.name != OCCLUSION);
+        volume.arrays.push(Array::new(OCCLUSION, 1, values));
+        let mut field_data = vec![
+            ("program".to_owned(), PROGRAM.to_owned()),
+            (PIPELINE.to_owned(), told.to_owned()),
+            (screen_space::WORD.to_owned(), self.screen_space.written().to_string()),
+        ];
+        let own: Vec<String> = field_data.iter().map(|(name, _)| name.clone()).collect();
+        // What is said of occlusion that is no longer there would be wrong.
+        let stays = |name: &str| {
+            !(own.iter().any(|o| o == name) || name == "TimeValue" || replaced && name.starts_with("occlusion_"))
+        };
+        field_data.extend(volume.field_data.iter().filter(|(name, _)| stays(name)).cloned());
+        let settings = vti::Settings { field_data, time, ..vti::Settings::default() };
+        let file = AtomicFile::create(path)?;
+        vti::write(file, &volume, &settings).map_err(AtomicFile::name_in(path))?.commit()
+    }
+}
+
+/// The camera that an image of `ao4d run` tells; what is wrong with it otherwise. None if it tells none.
+fn told_camera(volume: &Volume) -> Option<Result<CameraPlan, String>> {
+    let (_, text) = volume.field_data.iter().find(|(name, _)| name == SETTINGS)?;
+    let settings: Value = serde_json::from_str(text).ok()?;
+    let told: CameraPlan = serde_json::from_value(settings.get("camera")?.clone()).ok()?;
+    let dimension = Dimension::new(told.eye.len() as u64)?;
+    // Whoever wrote it, it is checked as one in a pipeline is.
+    let checked = camera::plan(&told.spec(), "camera", dimension, &mut Vec::new());
+    Some(checked.map_err(|invalid| format!("its field data tell a camera that is none: {invalid}")))
+}
