@@ -115,7 +115,7 @@ fn a_linear_sky_is_lit_exactly<const D: usize>() {
 
 /// If all that is hit sends the same light, the bounce is that times what is hidden, be the rays few or many.
 fn surfaces_of_one_radiosity<const D: usize>() {
-    let backend = backend(mesh(&[soup::<D>(5, 16, 0.6)]));
+    let backend = backend(mesh(&[soup::<D>(5, 16, if D == 4 { 1.2 } else { 0.6 })]));
     let points = points(backend.tracer().mesh());
     let sent = vec![[0.25f32, 0.5, 1.0]; backend.tracer().mesh().vertices.len()];
     for estimator in [EXACT, Estimator::Sampled(Sampling::new(64, 1)), Estimator::Adaptive(Sampling::new(64, 1))] {
@@ -220,16 +220,19 @@ fn an_endless_fold<const D: usize>() {
     }
 }
 
-/// Of all bounces at least 85 % lie within two standard errors, whatever the sampler.
+/// Of all bounces at least 85 % lie within two standard errors, whatever the sampler; and errors are as large as said where an
+/// eighth of the rays or more hits something. Where hardly one does, more is said: what one ray more could bring.
 fn errors_of_the_bounce_are_calibrated<const D: usize>() {
-    let backend = backend(mesh(&[soup::<D>(11, 20, 0.6)]));
+    let backend = backend(mesh(&[if D == 4 { soup::<D>(11, 60, 1.2) } else { soup(11, 20, 0.6) }]));
     let points = points(backend.tracer().mesh());
     let sent: Vec<[f32; 3]> = (0..backend.tracer().mesh().vertices.len())
         .map(|v| [(v * 7 % 11) as f32 / 10.0, (v * 5 % 7) as f32 / 6.0, 0.5])
         .collect();
     let light =
         |sampling: Sampling| directional(Estimator::Sampled(sampling), &backend, &points, Some(&sent)).bounced.unwrap();
-    let truth = light(Sampling::new(1 << 12, 99));
+    let truth = directional(Estimator::Sampled(Sampling::new(1 << 12, 99)), &backend, &points, Some(&sent));
+    let (open, truth) = (truth.estimates.values, truth.bounced.unwrap());
+    assert!(open.iter().filter(|&&open| open < 0.875).count() > points.len() / 4, "enough is hidden");
     for sampler in [Sampler::Sobol, Sampler::Random] {
         for samples in [16, 60] {
             let (mut within, mut count, mut said, mut real) = (0, 0, 0.0, 0.0);
@@ -242,14 +245,14 @@ fn errors_of_the_bounce_are_calibrated<const D: usize>() {
                     let off = (0..3).map(|c| (found_light[c] - truth.light[i][c]).abs()).fold(0.0, f32::max);
                     within += usize::from(off <= 2.0 * error);
                     count += 1;
-                    (said, real) = (said + f64::from(error).powi(2), real + f64::from(off).powi(2));
+                    if open[i] < 0.875 {
+                        (said, real) = (said + f64::from(error).powi(2), real + f64::from(off).powi(2));
+                    }
                 }
             }
             let (share, ratio) = (within as f64 / count as f64, (said / real).sqrt());
             println!("{D}D {sampler:?} {samples}: {share:.3} within two errors, said / real {ratio:.2}");
-            // Few rays, of which hardly one hits anything, say more than they are off.
-            let most = if samples == 16 { 2.5 } else { 1.8 };
-            assert!(share > 0.85 && (0.7..most).contains(&ratio), "{sampler:?} {samples}: {share} {ratio}");
+            assert!(share > 0.85 && (0.7..1.8).contains(&ratio), "{sampler:?} {samples}: {share} {ratio}");
         }
     }
 }
