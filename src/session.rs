@@ -7,10 +7,11 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::accel::Tracer;
+use crate::geometry::Vector64;
 use crate::mesh::Mesh;
-use crate::occlusion::{Error, Estimates, Estimator};
+use crate::occlusion::{Bounced, Directional, Error, Estimates, Estimator};
 use crate::progress::Progress;
-use crate::render::{Aov, Camera, Renderer, Shading};
+use crate::render::{Aov, Camera, Renderer, Shading, radiosity};
 use crate::trace::cpu::CpuBackend;
 use crate::trace::opencl::{self, OpenCl, OpenClBackend};
 use crate::trace::{RayBackend, ShadingPoint};
@@ -52,6 +53,11 @@ impl<const D: usize> Session<D> {
         self.hash.get_or_init(|| self.mesh().content_hash())
     }
 
+    /// Whether OpenCL devices trace its rays.
+    pub fn is_on_opencl(&self) -> bool {
+        self.opencl.is_some()
+    }
+
     /// What traces rays.
     ///
     /// # Errors
@@ -76,6 +82,32 @@ impl<const D: usize> Session<D> {
         progress: &dyn Progress,
     ) -> Result<Estimates, Error> {
         estimator.estimate(&**self.backend()?, &ShadingPoint::vertices(self.mesh()), mask, progress)
+    }
+
+    /// Ambient occlusion at the vertices with the vector b of the open directions.
+    ///
+    /// # Errors
+    /// As [`Session::occlusion`].
+    pub fn directional(&self, estimator: Estimator, progress: &dyn Progress) -> Result<Directional<D>, Error> {
+        estimator.directional(&**self.backend()?, &ShadingPoint::vertices(self.mesh()), None, progress)
+    }
+
+    /// The light of other surfaces at the vertices, under a sky of this gradient: the radiosity of the vertices, which points
+    /// between them gather, and what the vertices gather themselves.
+    ///
+    /// # Errors
+    /// As [`Session::occlusion`].
+    pub fn bounced(
+        &self,
+        estimator: Estimator,
+        found: &Directional<D>,
+        gradient: &Vector64<D>,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<[f32; 3]>, Bounced), Error> {
+        let radiosity = radiosity(self.mesh(), found, gradient);
+        let points = ShadingPoint::vertices(self.mesh());
+        let bounced = estimator.bounced(&self.tracer, &points, &found.estimates, &radiosity, progress)?;
+        Ok((radiosity, bounced))
     }
 
     /// A picture to be made slab by slab.

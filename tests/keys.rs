@@ -23,7 +23,7 @@ stages:
   - occlusion: {id: loaded, input: s, load: v.f32}
   - occlusion: {id: exact, input: s, method: exact, max_cones: 1000, file: e.f32}
   - render: {id: r, input: s, occlusion: o, dimensions: [3, 4, 5], shading: smooth, visibility: ray_cast, camera: {projection: perspective, eye: [0, 0, 0, 2], target: [0, 0, 0, 0], field_of_view: 60, up: [0, 1, 0, 0], over: [0, 0, 1, 0]}}
-  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, layers: 2, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
+  - render: {id: parallel, occlusion: o2, dimensions: [3, 4, 5], shading: voxel, supersample: 1, layers: 2, dilate: 1, lights: [{direction: [0, -1, 0, 0]}, {position: [0, 2, 0, 0], color: 1, intensity: 2}], ambient: 0.2, sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, specular: 0.1, shininess: 10, depth_cue: {near: 1, far: 5, color: 1}, camera: {projection: parallel, height: 2}}
   - render: {id: mended, occlusion: o2, dimensions: [3, 4, 5], shading: auto}
   - write: {id: w, input: r, vti: a.vti, raw: a.raw, vtu: a.vtu, png: a.png, arrays: [rgba, opacity], encoding: appended, compression: none}
   - write: {id: w2, input: parallel, vti: b.vti}
@@ -85,6 +85,9 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("LightSpec.color", Ok("parallel.lights[1].color=[1, 1, 0]")),
     ("LightSpec.intensity", Ok("parallel.lights[1].intensity=3")),
     ("RenderSpec.ambient", Ok("parallel.ambient=0.1")),
+    ("RenderSpec.sky", Err("its keys follow")),
+    ("SkySpec.gradient", Ok("parallel.sky.gradient=[0, 0.4, 0, 0]")),
+    ("RenderSpec.bounce", Ok("parallel.bounce=0")),
     ("RenderSpec.specular", Ok("parallel.specular=0.2")),
     ("RenderSpec.shininess", Ok("parallel.shininess=11")),
     ("RenderSpec.depth_cue", Err("its keys follow")),
@@ -209,6 +212,7 @@ fn every_key_counts_or_has_a_reason() {
             "ParaviewSpec",
             "LightSpec",
             "DepthCueSpec",
+            "SkySpec",
             "TurnSpec",
             "MoveSpec",
             "ScreenSpaceSpec",
@@ -254,9 +258,11 @@ fn every_object_s_field_counts() {
     ] {
         assert_eq!(differing(&before, &keys(folder.path(), PIPELINE, &[set])), all, "{set}");
     }
-    // The closed form knows opaque objects only.
-    let opaque = keys(folder.path(), PIPELINE, &["exact.method=sobol"]);
-    let open = keys(folder.path(), PIPELINE, &["exact.method=sobol", "s.objects[0].opacity=0.5"]);
+    // The closed form and skies know opaque objects only.
+    let even = PIPELINE.replace("sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, ", "");
+    assert_ne!(even, PIPELINE);
+    let opaque = keys(folder.path(), &even, &["exact.method=sobol"]);
+    let open = keys(folder.path(), &even, &["exact.method=sobol", "s.objects[0].opacity=0.5"]);
     assert_eq!(differing(&opaque, &open), all);
     // What faces the eye depends on where the first camera is.
     let moved = differing(&before, &keys(folder.path(), PIPELINE, &["r.camera.eye=[0, 0, 0, 3]"]));

@@ -118,6 +118,11 @@ impl<const D: usize> Tracer<D> {
         self.closest_of(ray, |_, _, _| true)
     }
 
+    /// The simplex that the ray hits first of all but the `ignored` ones, if any.
+    pub fn closest_hit_of_others(&self, ray: &Ray<D>, ignored: &[u32]) -> Option<Hit<D>> {
+        self.closest_of(ray, |simplex, _, _| !ignored.contains(&simplex))
+    }
+
     /// The simplex that the ray hits first behind the place where it hits the simplex `after`: strictly behind, by
     /// exact signs, so that what touches or coincides there is passed over, and layer after layer can be peeled off.
     /// A simplex that the ray doesn't hit bounds nothing.

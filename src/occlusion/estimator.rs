@@ -21,10 +21,10 @@ use crate::progress::{Cancelled, Progress};
 use crate::trace::{Estimate, RayBackend, Sampling, ShadingPoint};
 
 /// A view is simple if at most so many simplices rise above the horizon,
-const SIMPLE: usize = 64;
+pub(super) const SIMPLE: usize = 64;
 
 /// and cut each other into at most so many pieces: some milliseconds.
-const PIECES: Budget = Budget { cones: 8192 };
+pub(super) const PIECES: Budget = Budget { cones: 8192 };
 
 /// Points that a thread takes at once, where each may take milliseconds.
 const BATCH: usize = 4;
@@ -124,7 +124,11 @@ impl Estimator {
 
 /// The places of the points that are asked for, those that are close in the hierarchy close to each other: then the nodes
 /// that one of them needs are still in the cache for the next.
-fn spatial_order<const D: usize>(tracer: &Tracer<D>, points: &[ShadingPoint<D>], mask: Option<&[bool]>) -> Vec<usize> {
+pub(super) fn spatial_order<const D: usize>(
+    tracer: &Tracer<D>,
+    points: &[ShadingPoint<D>],
+    mask: Option<&[bool]>,
+) -> Vec<usize> {
     const LAST: u32 = u32::MAX;
     let mesh = tracer.mesh();
     let (mut of_simplex, mut of_vertex) = (vec![LAST; mesh.simplices.len()], vec![LAST; mesh.vertices.len()]);
@@ -191,7 +195,7 @@ fn in_closed_form<const D: usize>(
 }
 
 /// What a point is called if whoever asks has no better name.
-fn name<const D: usize>(point: &ShadingPoint<D>) -> String {
+pub(super) fn name<const D: usize>(point: &ShadingPoint<D>) -> String {
     match point {
         ShadingPoint::Vertex(vertex) => format!("vertex {vertex}"),
         ShadingPoint::Inside { simplex, .. } => format!("a point of simplex {simplex}"),

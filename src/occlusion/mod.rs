@@ -13,10 +13,18 @@
 //!   convex surroundings block nothing; a concave fold blocks the same, be the surface open or closed;
 //! - a visible point inside a simplex ignores that simplex.
 //!
+//! Beside A stands a vector that tells where the open directions are (directional occlusion; Ritschel, Grosch and Seidel,
+//! *Approximating Dynamic Global Illumination in Image Space*, 2009), and the light that other surfaces send ([`Directional`]):
+//!
+//! ```text
+//! b(p, n) = 1/c_D * integral over the hemisphere around n of V(p, w) w (w . n) dw
+//! ```
+//!
 //! There is one door: an [`Estimator`] takes shading points and gives [`Estimates`], with rays traced by any
 //! [`crate::trace::RayBackend`].
 
 mod as_published;
+mod directional;
 mod error;
 mod estimator;
 pub mod exact;
@@ -24,6 +32,7 @@ mod file;
 
 pub use crate::progress::Cancelled;
 pub use as_published::{AsProgrammed, AsPublished, Deviations, ProgramDeviations, plain_cramer};
+pub use directional::{Bounced, Directional, open_vector};
 pub use error::Error;
 pub use estimator::{Estimates, Estimator};
 pub use file::{FileError, Sidecar, decode, encode};

@@ -200,7 +200,7 @@ impl Schedule<'_> {
             Some(opencl) => Session::on(mesh, Arc::clone(opencl)),
             None => Session::new(mesh),
         };
-        let mut at_work = SceneRun { session, values: BTreeMap::new() };
+        let mut at_work = SceneRun::new(session);
         for stage in (0..plan.stages.len()).filter(|&stage| plan.scene_of(stage) == Some(scene)) {
             if stage != scene.index() {
                 self.stage(stage, |run| plan.run(stage, run, &mut at_work))?;

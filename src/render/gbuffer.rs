@@ -135,6 +135,16 @@ columns! {
     misfit MISFIT: f32 = 0.0;
     /// The standard error of the occlusion; 0 where nothing is.
     error ERROR: f32 = 0.0;
+    /// The mean open direction: the vector b over the occlusion; zero where nothing is, or nothing is open.
+    direction DIRECTION: Vector<D> = Vector::zeros();
+    /// The mean light of what hides the sky, red, green and blue: the bounce over one less the occlusion; black where nothing is, or
+    /// all is open.
+    hidden HIDDEN: [f32; 3] = [0.0; 3];
+    /// The standard error of the bounce; 0 where nothing is.
+    bounce_error BOUNCE_ERROR: f32 = 0.0;
+    /// The light that arrives from the sky and from other surfaces, where an open surface under a sky of 1 has 1; 1 where
+    /// nothing is.
+    irradiance IRRADIANCE: [f32; 3] = [1.0; 3];
     /// The part of the voxel that sees something, 0 to 1.
     coverage COVERAGE: f32 = 0.0;
     /// How many surfaces the ray through the voxel's centre passes, 65,535 at most; 0 where nothing is.

@@ -8,7 +8,7 @@
 //!    somebody asked for;
 //! 3. `occlude`: ambient occlusion at those points, where it does not come from the vertices; or [`screen_space`], which
 //!    looks for it in the image alone;
-//! 4. [`filters`]: what looks at neighbouring voxels;
+//! 4. [`filters`]: what looks at neighbouring voxels; then the light of the sky and of other surfaces ([`Skylight`]);
 //! 5. [`Aov`]: the columns as the numbers of an array, for each array that somebody asked for.
 //!
 //! Where light passes objects, `behind` adds what is seen through them. Beside all this stand [`Layers`]: all surfaces that a voxel's ray passes, as arrays of their own.
@@ -26,6 +26,7 @@ mod renderer;
 mod samples;
 pub mod screen_space;
 mod shading;
+mod skylight;
 mod surface;
 pub mod tone;
 pub mod visibility;
@@ -40,4 +41,5 @@ pub use renderer::{Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
 pub use screen_space::{DepthImage, ScreenSpace, Thickness};
 pub use shading::Shading;
+pub use skylight::{Skylight, radiosity, relight};
 pub use visibility::{NOTHING, Passages, Visibility};

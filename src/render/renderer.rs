@@ -8,9 +8,10 @@ use super::filters::{self, Chain, ImageFilter};
 use super::gbuffer::{Columns, GBuffer};
 use super::layers::LayerPass;
 use super::samples::Sampling;
+use super::skylight::shine;
 use super::surface::SurfacePass;
 use super::{
-    Accuracy, Aov, Camera, DepthImage, Lighting, NOTHING, ScreenSpace, Shading, Visibility, behind, occlude,
+    Accuracy, Aov, Camera, DepthImage, Lighting, NOTHING, ScreenSpace, Shading, Skylight, Visibility, behind, occlude,
     screen_space, visibility,
 };
 use crate::accel::Tracer;
@@ -36,6 +37,9 @@ pub struct Renderer<const D: usize> {
     pub shading: Shading,
     /// How it is lit; none shows colour times ambient occlusion.
     pub lighting: Option<Lighting<D>>,
+    /// The sky, and the light of other surfaces; none is a sky that shines on all sides alike. Of a picture that is not lit
+    /// only the arrays show it.
+    pub skylight: Option<Arc<Skylight<D>>>,
     /// How it is found out what voxels see; changes the time only.
     pub visibility: visibility::Method,
     /// Samples of a voxel along each axis, at least 1: what is seen is looked at so finely.
@@ -66,17 +70,17 @@ impl<const D: usize> Renderer<D> {
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
         let grid = camera.grid(dimensions);
         let visibility = visibility::Method::Auto;
-        let filters = Vec::new();
         Self {
             backend,
             camera,
             grid,
             shading,
             lighting: None,
+            skylight: None,
             visibility,
             supersample: 1,
             layers: 0,
-            filters,
+            filters: Vec::new(),
             audit: None,
         }
     }
@@ -116,6 +120,7 @@ impl<const D: usize> Renderer<D> {
             visibility: &visibility,
             shading: &self.shading,
             lighting: self.lighting.as_ref(),
+            skylight: self.skylight.as_deref(),
         };
         if columns.contains(Columns::DIRECT) {
             self.tracer().prepare();
@@ -140,7 +145,10 @@ impl<const D: usize> Renderer<D> {
                 behind::add(&pass, &*self.backend, &mut buffer, progress)?;
             }
             match self.shading {
-                Shading::Voxel(estimator) => occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?,
+                Shading::Voxel(estimator) => {
+                    let skylight = self.skylight.as_deref();
+                    occlude::occlude_and_light(&*self.backend, estimator, &mut buffer, skylight, progress)?;
+                }
                 Shading::Auto(_, estimator) => {
                     buffer.interpolated.copy_from_slice(&buffer.occlusion);
                     occlude::occlude(&*self.backend, estimator, &mut buffer, progress)?;
@@ -156,6 +164,7 @@ impl<const D: usize> Renderer<D> {
         let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
         for first in (0..depth).step_by(thickness) {
             let mut buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+            shine(self.skylight.as_deref(), &mut buffer);
             let layers = layered.as_ref().map(|pass| pass.layers(buffer.layers(), progress)).transpose()?;
             let layers = layers.unwrap_or_default();
             buffer.passages.iter_mut().enumerate().for_each(|(i, count)| *count = layers.count(i));
@@ -195,6 +204,7 @@ impl<const D: usize> Renderer<D> {
             visibility: &visibility,
             shading: &Shading::None,
             lighting: None,
+            skylight: None,
         };
         let columns = Columns::SIMPLEX | Columns::DEPTH;
         let [_, _, layers] = self.grid.dimensions;
@@ -211,13 +221,22 @@ impl<const D: usize> Renderer<D> {
     /// The columns that arrays and filters need.
     fn columns(&self, aovs: &[Aov]) -> Columns {
         let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
-        let columns = columns(&self.shading, aovs)
+        let mut columns = columns(&self.shading, aovs)
             | audited
             | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns());
-        let is_lit = self.lighting.is_some() && columns.contains(Columns::ALBEDO);
-        let passes = self.tracer().mesh().is_translucent() && columns.intersects(Columns::ALBEDO | Columns::COVERAGE);
-        let or_none = |wanted: bool, more: Columns| if wanted { more } else { Columns::empty() };
-        columns | or_none(is_lit, Columns::DIRECT) | or_none(passes, behind::COLUMNS)
+        if self.lighting.is_some() && columns.contains(Columns::ALBEDO) {
+            columns |= Columns::DIRECT;
+            if self.skylight.is_some() {
+                columns |= Columns::IRRADIANCE;
+            }
+        }
+        if columns.contains(Columns::IRRADIANCE) {
+            columns |= Columns::OCCLUSION | self.skylight.as_deref().map_or(Columns::empty(), Skylight::columns);
+        }
+        if self.tracer().mesh().is_translucent() && columns.intersects(Columns::ALBEDO | Columns::COVERAGE) {
+            columns |= behind::COLUMNS;
+        }
+        columns
     }
 
     /// Layers of a slab whose working set stays below `bytes`; at least one.

@@ -13,11 +13,11 @@ use rayon::prelude::*;
 use super::gbuffer::{Columns, GBuffer, RowMut};
 use super::light::{Lighting, Lit, reflectance};
 use super::samples::{Group, Sampling};
-use super::{Camera, Shading, Visibility};
+use super::{Camera, Shading, Skylight, Visibility};
 use crate::accel::Tracer;
 use crate::geometry::{Cone, Crossing, Ray, Vector, Vector64, narrow, normal_of, widen};
 use crate::mesh::normals::unit;
-use crate::occlusion::Error;
+use crate::occlusion::{Error, open_vector};
 use crate::progress::Progress;
 
 /// What turns hits into columns.
@@ -28,6 +28,7 @@ pub(super) struct SurfacePass<'r, const D: usize> {
     pub visibility: &'r Visibility<D>,
     pub shading: &'r Shading,
     pub lighting: Option<&'r Lighting<D>>,
+    pub skylight: Option<&'r Skylight<D>>,
 }
 
 /// Where a ray meets a simplex.
@@ -53,14 +54,22 @@ impl<const D: usize> Scratch<D> {
 }
 
 /// Means over a voxel's samples, weighted by their number.
-#[derive(Default)]
-struct Means {
+struct Means<const D: usize> {
     samples: f64,
     depth: f64,
     occlusion: f64,
     error: f64,
     albedo: [f64; 3],
     lit: [f64; 3],
+    sky: Skies<D>,
+}
+
+/// Sums of where the sky is open, and of the light of what hides it.
+struct Skies<const D: usize> {
+    open: f64,
+    vector: Vector64<D>,
+    bounced: [f64; 3],
+    bounced_error: f64,
 }
 
 impl<const D: usize> SurfacePass<'_, D> {
@@ -112,7 +121,7 @@ impl<const D: usize> SurfacePass<'_, D> {
         set(out.object, i, || mesh.object_of(simplex) as u16 + 1);
         set(out.coverage, i, || seen as f32 / self.sampling.count() as f32);
         if out.has_means() {
-            self.means(index, scratch).set(i, out);
+            self.means(index, scratch, out.has_sky()).set(i, out);
         }
         if !out.has_point() {
             return;
@@ -130,9 +139,9 @@ impl<const D: usize> SurfacePass<'_, D> {
     }
 
     /// The means over a voxel's groups.
-    fn means(&self, index: [usize; 3], scratch: &mut Scratch<D>) -> Means {
+    fn means(&self, index: [usize; 3], scratch: &mut Scratch<D>, has_sky: bool) -> Means<D> {
         let mesh = self.tracer.mesh();
-        let mut means = Means::default();
+        let mut means = Means::<D>::nothing();
         for g in 0..scratch.groups.len() {
             let group = scratch.groups[g];
             let ray = self.sampling.mean_ray(self.camera, index, &group);
@@ -154,6 +163,9 @@ impl<const D: usize> SurfacePass<'_, D> {
             for (c, color) in ambient.into_iter().enumerate() {
                 means.albedo[c] += kept * color;
                 means.lit[c] += kept * color * occlusion;
+            }
+            if has_sky {
+                self.add_sky(&hit, weight, &mut means.sky);
             }
         }
         means
@@ -185,6 +197,38 @@ impl<const D: usize> SurfacePass<'_, D> {
             }
         }
         sum.map(|c: f64| (c / count).min(f64::from(f32::MAX)) as f32)
+    }
+
+    /// Adds where the sky is open at a point, by the values at the simplex's vertices.
+    fn add_sky(&self, hit: &Hit<D>, weight: f64, sky: &mut Skies<D>) {
+        let mesh = self.tracer.mesh();
+        let vertices = mesh.simplices[hit.simplex as usize];
+        let weights = match self.shading {
+            Shading::None => {
+                let normal = normal_of(&mesh.corners(hit.simplex).map(|v| widen(&v)));
+                sky.open += weight;
+                sky.vector += open_vector(&widen(&facing(normal, &hit.ray))) * weight;
+                return;
+            }
+            // Found at the point itself, or not at all.
+            Shading::Voxel(_) | Shading::ScreenSpace(_) => return,
+            Shading::Flat(_) => [weight / D as f64; D],
+            Shading::Smooth(_) | Shading::Auto(..) => hit.crossing.barycentric.map(|w| w * weight),
+        };
+        let Some(skylight) = self.skylight else { return };
+        let directions = skylight.directions.as_deref();
+        let mut variance = 0.0;
+        for (v, w) in vertices.into_iter().map(|v| v as usize).zip(weights) {
+            if let Some(found) = directions {
+                sky.open += w * f64::from(found.estimates.values[v]);
+                sky.vector += widen(&found.vectors[v]) * w;
+            }
+            if let Some(bounced) = skylight.bounced.as_deref() {
+                (0..3).for_each(|c| sky.bounced[c] += w * f64::from(bounced.light[v][c]));
+                variance += (w * f64::from(bounced.errors[v])).powi(2);
+            }
+        }
+        sky.bounced_error += variance.sqrt();
     }
 
     /// What lights ask of a point.
@@ -230,11 +274,22 @@ impl<const D: usize> RowMut<'_, D> {
     /// Whether it has columns that are means over a voxel's samples.
     fn has_means(&self) -> bool {
         !(self.depth.is_empty() && self.occlusion.is_empty() && self.error.is_empty() && self.albedo.is_empty())
+            || self.has_sky()
+    }
+
+    /// Whether it has columns of where the sky is open.
+    fn has_sky(&self) -> bool {
+        !(self.direction.is_empty() && self.hidden.is_empty() && self.bounce_error.is_empty())
     }
 }
 
-impl Means {
-    fn set<const D: usize>(&self, i: usize, out: &mut RowMut<D>) {
+impl<const D: usize> Means<D> {
+    fn nothing() -> Self {
+        let sky = Skies { open: 0.0, vector: Vector64::zeros(), bounced: [0.0; 3], bounced_error: 0.0 };
+        Self { samples: 0.0, depth: 0.0, occlusion: 0.0, error: 0.0, albedo: [0.0; 3], lit: [0.0; 3], sky }
+    }
+
+    fn set(&self, i: usize, out: &mut RowMut<D>) {
         let mean = |sum: f64| (sum / self.samples) as f32;
         set(out.depth, i, || mean(self.depth));
         set(out.occlusion, i, || mean(self.occlusion));
@@ -243,6 +298,14 @@ impl Means {
         let albedo =
             |c: usize| if self.occlusion > 0.0 { (self.lit[c] / self.occlusion) as f32 } else { mean(self.albedo[c]) };
         set(out.albedo, i, || [0, 1, 2].map(albedo));
+        let (open, hidden) = (self.sky.open, self.samples - self.sky.open);
+        if open > 0.0 {
+            set(out.direction, i, || narrow(&(self.sky.vector / open)));
+        }
+        if hidden > 0.0 {
+            set(out.hidden, i, || self.sky.bounced.map(|c| (c / hidden) as f32));
+        }
+        set(out.bounce_error, i, || mean(self.sky.bounced_error));
     }
 }
 

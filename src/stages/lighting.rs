@@ -1,4 +1,4 @@
-//! How a render is lit: `lights`, `ambient`, `specular`, `shininess` and `depth_cue`, checked and filled in.
+//! How a render is lit: `lights`, `ambient`, `sky`, `bounce`, `specular`, `shininess` and `depth_cue`, checked and filled in.
 //!
 //! A render with none of these keys isn't lit: it shows colour times ambient occlusion, as it is.
 
@@ -11,8 +11,9 @@ use super::camera::check_vector;
 use super::range::check_length;
 use crate::geometry::{Dimension, Vector64};
 use crate::render::tone::to_linear;
-use crate::render::{DepthCue, Light, Lighting, Source};
+use crate::render::{DepthCue, Light, Lighting, Skylight, Source};
 use crate::scene::Color;
+use crate::session::Session;
 use crate::text::number;
 
 /// The most lights of a render.
@@ -40,6 +41,15 @@ pub struct LightSpec {
     pub intensity: Option<f64>,
 }
 
+/// A sky that is not equally bright on all sides.
+#[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct SkySpec {
+    /// Where the sky is brighter, and by how much: from the direction w comes the light 1 + gradient . w, times `ambient`. At
+    /// most of length 1, with which the opposite side is black.
+    pub gradient: Vec<f64>,
+}
+
 /// What is far from the eye takes on a colour, evenly from one distance to another.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
@@ -57,9 +67,24 @@ pub struct DepthCueSpec {
 pub(super) struct LightingKeys<'s> {
     pub lights: Option<&'s [LightSpec]>,
     pub ambient: Option<f64>,
+    pub sky: Option<&'s SkySpec>,
+    pub bounce: Option<u64>,
     pub specular: Option<f64>,
     pub shininess: Option<f64>,
     pub depth_cue: Option<&'s DepthCueSpec>,
+}
+
+/// What light from the sky and from other surfaces a picture needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightAsked<'a> {
+    /// How it is lit, if it is.
+    pub lighting: Option<&'a LightingPlan>,
+    /// Whether it matters where the sky is open.
+    pub directions: bool,
+    /// Whether other surfaces send light.
+    pub bounce: bool,
+    /// Whether each voxel looks for itself.
+    pub at_voxels: bool,
 }
 
 /// How a render is lit.
@@ -69,6 +94,10 @@ pub struct LightingPlan {
     pub lights: Vec<LightPlan>,
     /// The ambient light where all is open.
     pub ambient: f64,
+    /// The sky's gradient, one number a dimension; none if it shines on all sides alike.
+    pub sky: Option<Vec<f64>>,
+    /// Whether the light of other surfaces is added, once reflected.
+    pub bounce: bool,
     /// The share of lights that is reflected in highlights.
     pub specular: f64,
     /// The exponent of highlights.
@@ -131,6 +160,15 @@ pub(super) fn plan(
     let [beside_lights, without] = AMBIENT;
     let ambient = if lights.is_empty() { without } else { beside_lights };
     let ambient = within(&format!("{path}.ambient"), keys.ambient, ambient, 0.0, 1e6)?;
+    let sky = keys.sky.map(|sky| gradient(sky, &format!("{path}.sky.gradient"), dimension)).transpose()?;
+    let bounce = match keys.bounce {
+        None | Some(0) => false,
+        Some(1) => true,
+        Some(n) => {
+            let message = format!("expected 0 or 1, found {n}: light is followed over one reflection, not over more");
+            return Err(Invalid::new(format!("{path}.bounce"), message));
+        }
+    };
     let specular = within(&format!("{path}.specular"), keys.specular, 0.0, 0.0, 1.0)?;
     let shininess = within(&format!("{path}.shininess"), keys.shininess, SHININESS, 1.0, 1e6)?;
     let depth_cue = keys.depth_cue.map(|cue| depth_cue(cue, &format!("{path}.depth_cue"))).transpose()?;
@@ -144,8 +182,24 @@ pub(super) fn plan(
     if keys.shininess.is_some() && (lights.is_empty() || specular == 0.0) {
         unused("shininess", "has no effect without `lights` and `specular`");
     }
-    let is_lit = !lights.is_empty() || keys.ambient.is_some() || depth_cue.is_some();
-    Ok(is_lit.then_some(LightingPlan { lights, ambient, specular, shininess, depth_cue }))
+    let is_lit = !lights.is_empty() || keys.ambient.is_some() || depth_cue.is_some() || sky.is_some() || bounce;
+    Ok(is_lit.then_some(LightingPlan { lights, ambient, sky, bounce, specular, shininess, depth_cue }))
+}
+
+/// A sky's gradient, checked.
+fn gradient(spec: &SkySpec, path: &str, dimension: Dimension) -> Result<Vec<f64>, Invalid> {
+    let gradient = check_vector(path, &spec.gradient, dimension.get())?;
+    let length = gradient.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // As near as rounding of what is written.
+    if length > 1.0 + 1e-9 {
+        let found = number((length * 1e3).round() / 1e3);
+        let message = format!(
+            "expected a vector of length 1 at most, found one of length {found}: the darkest side of the sky would be \
+             darker than black; make it shorter, and `ambient` larger if the picture is to be brighter"
+        );
+        return Err(Invalid::new(path, message));
+    }
+    Ok(gradient)
 }
 
 fn light_plan(spec: &LightSpec, path: &str, dimension: Dimension) -> Result<LightPlan, Invalid> {
@@ -223,6 +277,11 @@ impl LightingPlan {
         lighting
     }
 
+    /// The sky's gradient.
+    pub fn gradient<const D: usize>(&self) -> Vector64<D> {
+        self.sky.as_ref().map_or_else(Vector64::zeros, |gradient| Vector64::from_fn(|r, _| gradient[r]))
+    }
+
     /// As it is written in a pipeline, nothing left out that has an effect.
     pub(super) fn written(&self) -> Map<String, Value> {
         let light = |light: &LightPlan| {
@@ -233,6 +292,12 @@ impl LightingPlan {
             serde_json::json!({ key: light.vector, "color": light.color, "intensity": light.intensity })
         };
         let mut written = Map::from_iter([("ambient".to_owned(), self.ambient.into())]);
+        if let Some(gradient) = &self.sky {
+            written.insert("sky".to_owned(), serde_json::json!({ "gradient": gradient }));
+        }
+        if self.bounce {
+            written.insert("bounce".to_owned(), 1.into());
+        }
         if !self.lights.is_empty() {
             written.insert("lights".to_owned(), self.lights.iter().map(light).collect());
             written.insert("specular".to_owned(), self.specular.into());
@@ -260,6 +325,40 @@ pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>) -> Vec<String> {
     notes
 }
 
+/// What was found of the light of the sky and of other surfaces for a picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightFound {
+    /// Rays that met other surfaces.
+    pub hits: u64,
+    /// How many of them met one from behind.
+    pub behind: u64,
+    /// Whether the processor traced them although OpenCL devices trace the others.
+    beside_opencl: bool,
+}
+
+impl LightFound {
+    pub fn new<const D: usize>(light: &Skylight<D>, session: &Session<D>) -> Self {
+        let (hits, behind) = light.seen();
+        Self { hits, behind, beside_opencl: session.is_on_opencl() }
+    }
+
+    /// What to tell of it; `rays` says how many meet surfaces from behind.
+    pub fn notes(&self, rays: &str) -> Vec<String> {
+        let behind = || {
+            format!(
+                "{rays} that look for light of other surfaces see one from behind, and were told the light of its front; turn \
+                 that object by `orientation`, or close it"
+            )
+        };
+        let beside = || {
+            "open directions and the light of other surfaces were traced on the processor, as OpenCL devices tell whether \
+             rays hit something, not what"
+                .to_owned()
+        };
+        (self.behind > 0).then(behind).into_iter().chain(self.beside_opencl.then(beside)).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,6 +384,9 @@ mod tests {
             lighting("depth_cue: {near: 1, far: 2}\nspecular: 0.5\nshininess: 3\nlights: []", 4).unwrap();
         assert_eq!(plan.unwrap().ambient, 1.0);
         assert_eq!(warnings.len(), 3, "{warnings:?}");
+        assert_eq!(lighting("bounce: 0", 3).unwrap(), (None, vec![]));
+        let plan = lighting("bounce: 1\nsky: {gradient: [0, 1, 0]}", 3).unwrap().0.unwrap();
+        assert!(plan.bounce && plan.ambient == 1.0 && plan.gradient::<3>().as_slice() == [0.0, 1.0, 0.0]);
     }
 
     #[test]
@@ -311,6 +413,16 @@ mod tests {
                 "render.lights[0].intensity: expected a number from 0 to 1e12, found -1",
             ),
             ("lights: [{position: [0, 0, 0, 1], color: -0.5}]", "render.lights[0].color: -0.5 is not from 0 to 1"),
+            ("sky: {gradient: [0, 1, 0]}", "render.sky.gradient: expected 4 numbers (the scene is 4D), found 3"),
+            (
+                "sky: {gradient: [0, 1, 0, 0.5]}",
+                "render.sky.gradient: expected a vector of length 1 at most, found one of length 1.118: the darkest side of the \
+                 sky would be darker than black; make it shorter, and `ambient` larger if the picture is to be brighter",
+            ),
+            (
+                "bounce: 2",
+                "render.bounce: expected 0 or 1, found 2: light is followed over one reflection, not over more",
+            ),
             ("ambient: -1", "render.ambient: expected a number from 0 to 1000000, found -1"),
             ("specular: 2", "render.specular: expected a number from 0 to 1, found 2"),
             ("shininess: 0", "render.shininess: expected a number from 1 to 1000000, found 0"),

@@ -14,7 +14,7 @@ use super::describe::{Counts, grouped};
 use super::occlusion::{self, OcclusionPlan};
 use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
-use super::write::vtu;
+use super::write::{Found, vtu};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::io;
 
@@ -108,7 +108,14 @@ impl Stage for MeshPlan {
         let mesh = scene.session.mesh();
         let points: Vec<[f32; 3]> = mesh.vertices.iter().map(vtu::first_three).collect();
         let values = occlusion.map(|occlusion| &*scene.values[&occlusion]);
-        let bytes = vtu::write(&plan.out.join(file), run.told, mesh, &points, &mesh.simplices, values)?;
+        let bytes = vtu::write(
+            &plan.out.join(file),
+            run.told,
+            mesh,
+            &points,
+            &mesh.simplices,
+            Found { values, vectors: None },
+        )?;
         run.made(file, bytes, Vec::new())?;
         Ok(String::new())
     }

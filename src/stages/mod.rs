@@ -43,6 +43,7 @@ mod run;
 pub mod scene;
 pub mod screen_space;
 pub mod shade;
+mod skylight;
 pub mod slice;
 mod subject;
 pub(crate) mod suggest;

@@ -11,6 +11,8 @@ use crate::trace::{Sampler, Sampling};
 const LEFT_BY_FIT: [f64; 2] = [0.07, 0.1];
 /// The part of the tolerance that this noise may take; the rest is for what a fit leaves out.
 const FOR_NOISE: f64 = 0.75;
+/// Rays that a vertex sends for directions where its values come from a file.
+const LOADED_RAYS: u32 = 256;
 /// Rays that a voxel is looked at again with, to measure pictures,
 const AUDIT_RAYS: u32 = 256;
 /// none of which are a picture's own.
@@ -60,6 +62,27 @@ impl OcclusionPlan {
         match computation.estimator() {
             Estimator::Sampled(sampling) if sampling.target.is_none() => Some(sampling),
             _ => None,
+        }
+    }
+
+    /// Why nothing is known of the directions in which the sky is open, if so.
+    pub fn no_directions(&self) -> Option<String> {
+        match &self.source {
+            OcclusionSource::Compute(computation) if computation.method.is_of_the_thesis() => Some(format!(
+                "`{}` tells how much of the sky is hidden, not where it is open; take `method: sobol`",
+                computation.method.as_str()
+            )),
+            _ => None,
+        }
+    }
+
+    /// What finds those directions: what finds the values, or, of values from a file, rays.
+    pub fn directional(&self, seed: u64, max_distance: f32) -> Estimator {
+        match &self.source {
+            OcclusionSource::Compute(computation) => computation.estimator(),
+            OcclusionSource::Load(_) => {
+                Estimator::Sampled(Sampling { max_distance, ..Sampling::new(LOADED_RAYS, seed) })
+            }
         }
     }
 

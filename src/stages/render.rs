@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
-use super::lighting::{self, DepthCueSpec, LightSpec, LightingKeys, LightingPlan};
+use super::lighting::{self, DepthCueSpec, LightAsked, LightFound, LightSpec, LightingKeys, LightingPlan, SkySpec};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::scene::ScenePlan;
 use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
@@ -28,7 +28,7 @@ use crate::progress::Progress;
 use crate::render::filters::denoise::Refine;
 use crate::render::filters::{Dilate, ImageFilter, denoise};
 use crate::render::visibility::Method as Visibility;
-use crate::render::{self, Accuracy, Aov, Columns, MOST_LAYERS, MOST_SAMPLES, NOTHING, Renderer};
+use crate::render::{self, Accuracy, Aov, Columns, MOST_LAYERS, MOST_SAMPLES, NOTHING, Renderer, Skylight};
 use crate::text::number;
 use crate::trace::Sampling;
 use crate::volume::Grid;
@@ -83,13 +83,19 @@ pub struct RenderSpec {
     /// renderings mix in nothing else; opacity tells what is real (default 3 in 4D, 0 in 3D).
     #[schemars(range(min = 0, max = 16))]
     pub dilate: Option<u64>,
-    /// Lights that throw shadows. With `lights`, `ambient` or `depth_cue` an image is lit: all light is added up in linear
+    /// Lights that throw shadows. With `lights`, `ambient`, `sky`, `bounce` or `depth_cue` an image is lit: all light is added up in linear
     /// numbers, `light` holds the sum, and the colours that are shown are what sRGB makes of it, white from 1 on. Without, it
     /// shows colour times occlusion.
     pub lights: Option<Vec<LightSpec>>,
     /// The light that comes from all sides, darkened by the occlusion (default 0.3 beside `lights`, 1 without).
     #[schemars(range(min = 0, max = 1_000_000))]
     pub ambient: Option<f64>,
+    /// A sky that is not equally bright on all sides; lights the picture exactly, by the open directions beside the
+    /// occlusion (default: equally bright).
+    pub sky: Option<SkySpec>,
+    /// With 1, surfaces are also lit by what other surfaces reflect of the sky, once (default 0); not of `lights`.
+    #[schemars(range(min = 0, max = 1))]
+    pub bounce: Option<u64>,
     /// The share of the lights that surfaces reflect in highlights (default 0).
     #[schemars(range(min = 0, max = 1))]
     pub specular: Option<f64>,
@@ -157,6 +163,8 @@ impl RenderSpec {
         LightingKeys {
             lights: self.lights.as_deref(),
             ambient: self.ambient,
+            sky: self.sky.as_ref(),
+            bounce: self.bounce,
             specular: self.specular,
             shininess: self.shininess,
             depth_cue: self.depth_cue.as_ref(),
@@ -168,6 +176,24 @@ impl RenderPlan {
     /// Whether anything darkens it.
     pub fn is_dark(&self) -> bool {
         self.occlusion.is_some() || self.screen_space.is_some()
+    }
+
+    /// What light from the sky and from other surfaces these arrays of it need.
+    pub(super) fn light_asked(&self, arrays: &[Aov]) -> LightAsked<'_> {
+        let lighting = self.lighting.as_ref();
+        let is_lit = arrays.iter().any(|aov| aov.is_lit() || *aov == Aov::Irradiance);
+        let is_bounce = |aov: &Aov| matches!(aov, Aov::Bounce | Aov::BounceError);
+        LightAsked {
+            lighting,
+            directions: arrays.contains(&Aov::BentNormal) || is_lit && lighting.is_some_and(|l| l.sky.is_some()),
+            bounce: lighting.is_some_and(|l| l.bounce) && (is_lit || arrays.iter().any(is_bounce)),
+            at_voxels: self.shading == Shading::Voxel,
+        }
+    }
+
+    /// Why nothing is known of the directions in which the sky is open, if so.
+    pub(super) fn no_directions(&self, plan: &Plan) -> Option<String> {
+        no_directions(plan, self.scene, self.occlusion, self.screen_space.is_some())
     }
 
     /// The number of voxels.
@@ -256,6 +282,14 @@ impl Stage for RenderPlan {
         let halo = if dimension == Dimension::Four { 3 } else { 0 };
         let dilate = within("dilate", spec.dilate, halo, 0, MAX_DILATION)?;
         let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
+        for (key, given) in [("sky", spec.sky.is_some()), ("bounce", lighting.as_ref().is_some_and(|l| l.bounce))] {
+            let needed = "needs an occlusion, which tells how much light reaches a surface";
+            let lacks = || (key == "bounce" && occlusion.is_none()).then(|| needed.to_owned());
+            let refusal = no_directions(&resolver.plan, scene, occlusion, screen_space.is_some()).or_else(lacks);
+            if let Some(message) = refusal.filter(|_| given) {
+                return Err(Invalid::new(format!("{path}.{key}"), message));
+            }
+        }
         let arrays = Vec::new();
         let tolerance = (shading == Shading::Auto && denoise).then_some(tolerance);
         Ok(Self {
@@ -364,13 +398,18 @@ impl Stage for RenderPlan {
         if let Some(occlusion) = render.occlusion.filter(|_| render.shading != Shading::Voxel) {
             occlusion::values(occlusion, run, scene)?;
         }
+        let skylight = scene.skylight(render.occlusion, render.light_asked(&render.arrays), run)?;
         let name = format!("render {}", plan.id(me));
-        let made = render.picture(&name, plan, scene, run.progress, |grid, hash| {
+        let made = render.picture(&name, plan, scene, skylight, run.progress, |grid, hash| {
             PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), grid, hash)
         })?;
         let mut notes: Vec<String> =
             made.nothing.iter().map(|why| format!("{name} shows background only: {why}")).collect();
         notes.extend(made.in_vain.iter().map(|told| format!("{name}: {told}")));
+        if let Some(light) = &made.light {
+            let rays = format!("{} of the {} rays", grouped(light.behind), grouped(light.hits));
+            notes.extend(light.notes(&rays).iter().map(|told| format!("{name}: {told}")));
+        }
         if made.behind > 0 {
             notes.push(format!(
                 "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
@@ -402,8 +441,11 @@ impl RenderPlan {
         let dimension = plan[render.scene].dimension;
         let arrays: u64 = aovs.iter().map(|&aov| array_bytes(aov, dimension, render.layers)).sum();
         let mut columns = aovs.iter().fold(Columns::SIMPLEX, |all, aov| all | aov.columns());
-        if render.lighting.is_some() {
+        if let Some(lighting) = &render.lighting {
             columns |= Columns::DIRECT;
+            if lighting.sky.is_some() || lighting.bounce {
+                columns |= Columns::IRRADIANCE | Columns::DIRECTION | Columns::HIDDEN;
+            }
         }
         if plan[render.scene].is_translucent() {
             columns |= Columns::BEHIND | Columns::THROUGH;
@@ -428,12 +470,13 @@ impl RenderPlan {
     }
 
     /// Makes the picture, and the files that `open` opens for it; `name` is what it is called where progress is told.
-    /// Values at vertices must be known where they are shown.
+    /// Values at vertices must be known where they are shown, and the light of the sky and of other surfaces found.
     pub(super) fn picture<const D: usize>(
         &self,
         name: &str,
         plan: &Plan,
         scene: &SceneRun<D>,
+        skylight: Option<Arc<Skylight<D>>>,
         progress: &dyn Progress,
         open: impl FnOnce(&Grid, &str) -> Result<PictureFiles, io::Error>,
     ) -> Result<Picture, StageError> {
@@ -443,6 +486,7 @@ impl RenderPlan {
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
         picture.layers = render.layers;
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
+        picture.skylight = skylight;
         picture.filters = filters(plan, render, &picture);
         picture.audit = render.audit(plan);
         let start = Instant::now();
@@ -472,10 +516,32 @@ impl RenderPlan {
             accuracy,
             nothing: nothing.then(|| nothing_seen(&picture)),
             in_vain: lit.map_or_else(Vec::new, lighting::in_vain),
+            light: picture.skylight.as_deref().map(|light| LightFound::new(light, &scene.session)),
             rendering,
             files: files.finish()?,
         })
     }
+}
+
+/// Why nothing is known of the directions in which the sky is open, if so.
+fn no_directions(
+    plan: &Plan,
+    scene: Ref<ScenePlan>,
+    occlusion: Option<Ref<OcclusionPlan>>,
+    in_screen_space: bool,
+) -> Option<String> {
+    if in_screen_space {
+        let message = "`screen_space` tells how much of the sky is hidden, not where it is open; take the occlusion of an \
+                       `occlusion` stage";
+        return Some(message.to_owned());
+    }
+    if let Some(name) = plan[scene].translucent() {
+        return Some(format!(
+            "{name} lets light through, and where the sky is open is found among opaque objects only; leave out `opacity` \
+             there"
+        ));
+    }
+    occlusion.and_then(|occlusion| plan[occlusion].no_directions())
 }
 
 /// What came of a picture.
@@ -492,6 +558,8 @@ pub(super) struct Picture {
     pub nothing: Option<String>,
     /// What its lights do in vain.
     pub in_vain: Vec<String>,
+    /// What was found of the light of the sky and of other surfaces, if it has any.
+    pub light: Option<LightFound>,
     /// How long it took.
     pub rendering: Duration,
     /// Its files, with their lengths.

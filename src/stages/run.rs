@@ -9,7 +9,7 @@ use super::occlusion::OcclusionPlan;
 use super::prepare::Loaded;
 use super::{Plan, Ref, StageError};
 use crate::io;
-use crate::occlusion::Estimates;
+use crate::occlusion::{Directional, Estimates};
 use crate::progress::Progress;
 use crate::session::Session;
 
@@ -94,4 +94,13 @@ pub struct SceneRun<const D: usize> {
     pub session: Session<D>,
     /// The values that are known.
     pub values: BTreeMap<Ref<OcclusionPlan>, Arc<Estimates>>,
+    /// Values with directions, of all vertices.
+    pub directions: BTreeMap<Ref<OcclusionPlan>, Arc<Directional<D>>>,
+}
+
+impl<const D: usize> SceneRun<D> {
+    /// A scene of which nothing is known yet.
+    pub fn new(session: Session<D>) -> Self {
+        Self { session, values: BTreeMap::new(), directions: BTreeMap::new() }
+    }
 }

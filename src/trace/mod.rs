@@ -9,11 +9,13 @@
 //! All of them give the same bits, since what a ray hits is decided by exact signs ([`crate::accel::Tracer`]), and the
 //! rays of a point depend on nothing but its number and the [`Sampling`]. What they share lies here: the
 //! [`ShadingPoint`], what its own simplices hide ([`Surroundings`]), its rays ([`Sequence`]), and what is made of them
-//! ([`Estimate`]). Among objects that let light through (`translucent`) the processor alone traces rays of ambient occlusion.
+//! ([`Estimate`]). What rays hit, and where the open ones go, is [`gather`]ed on the processor, which alone traces rays of
+//! ambient occlusion among objects that let light through (`translucent`).
 
 mod backend;
 pub mod cpu;
 mod estimate;
+mod gather;
 mod noise;
 pub mod opencl;
 mod point;
@@ -24,6 +26,7 @@ mod translucent;
 
 pub use backend::{Error, NOTHING, RayBackend};
 pub use estimate::Estimate;
+pub use gather::{Gathered, gather};
 pub use point::ShadingPoint;
 pub use sampling::{Sampler, Sampling, Sequence, Target, cube_to_ball, direction, square_to_disk};
 pub use surroundings::Surroundings;

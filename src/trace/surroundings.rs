@@ -32,15 +32,23 @@ pub(super) fn star_cone<const D: usize>(
     rises.then(|| Cone::new(columns))
 }
 
-/// The cones that the star of a vertex hides; none of a point that is no vertex.
-pub(super) fn star_cones<const D: usize>(tracer: &Tracer<D>, point: &ShadingPoint<D>) -> Vec<Cone<D>> {
+/// The cones that the star of a vertex hides, each with its simplex; none of a point that is no vertex.
+pub(super) fn star_cones<const D: usize>(tracer: &Tracer<D>, point: &ShadingPoint<D>) -> Vec<(u32, Cone<D>)> {
     let ShadingPoint::Vertex(vertex) = *point else { return Vec::new() };
     let mesh = tracer.mesh();
     let (position, normal) = (mesh.vertices[vertex as usize], mesh.normals[vertex as usize]);
     let identity = mesh.identity[vertex as usize];
     let around = tracer.incidence().around(identity);
     let ways = [normal, approach(mesh, around, vertex)];
-    around.iter().filter_map(|&simplex| star_cone(mesh, position, ways, identity, simplex)).collect()
+    let cone = |&simplex: &u32| Some((simplex, star_cone(mesh, position, ways, identity, simplex)?));
+    around.iter().filter_map(cone).collect()
+}
+
+/// What a ray meets, and where on it, in barycentric coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Met<const D: usize> {
+    pub simplex: u32,
+    pub barycentric: [f64; D],
 }
 
 /// A shading point with all that decides whether a ray from there escapes. This is the slow way, which defines it.
@@ -50,8 +58,8 @@ pub struct Surroundings<const D: usize> {
     pub position: Vector<D>,
     /// The middle of the hemisphere; of length 1, or zero if there is none.
     pub normal: Vector<D>,
-    /// What the vertex star hides.
-    star: Vec<Cone<D>>,
+    /// What the vertex star hides, simplex by simplex.
+    star: Vec<(u32, Cone<D>)>,
     /// The simplices this point is inside of.
     ignored: Vec<u32>,
 }
@@ -76,7 +84,7 @@ impl<const D: usize> Surroundings<D> {
     /// Whether the vertex star hides the ray's direction.
     #[inline]
     pub(crate) fn hides(&self, ray: &Ray<D>) -> bool {
-        self.star.iter().any(|cone| cone.contains(&ray.direction))
+        self.star.iter().any(|(_, cone)| cone.contains(&ray.direction))
     }
 
     /// The visibility V of a direction: whether a ray escapes, or reaches `limit`.
@@ -84,5 +92,17 @@ impl<const D: usize> Surroundings<D> {
     pub fn is_visible(&self, tracer: &Tracer<D>, direction: Vector<D>, limit: f32) -> bool {
         let ray = Ray::new(self.position, direction);
         !self.hides(&ray) && !tracer.occluded_by_others(&ray, limit, &self.ignored)
+    }
+
+    /// What a ray in this direction meets first; none if it is visible.
+    pub(super) fn meets(&self, tracer: &Tracer<D>, direction: Vector<D>, limit: f32) -> Option<Met<D>> {
+        let (ray, mesh) = (Ray::new(self.position, direction), tracer.mesh());
+        if let Some(&(simplex, _)) = self.star.iter().find(|(_, cone)| cone.contains(&ray.direction)) {
+            // Met at the vertex itself.
+            let here = |v: u32| f64::from(u8::from(mesh.vertices[v as usize] == self.position));
+            return Some(Met { simplex, barycentric: mesh.simplices[simplex as usize].map(here) });
+        }
+        let hit = tracer.closest_hit_of_others(&ray, &self.ignored)?;
+        (hit.t <= f64::from(limit)).then_some(Met { simplex: hit.simplex, barycentric: hit.barycentric })
     }
 }

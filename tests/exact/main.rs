@@ -10,6 +10,7 @@ macro_rules! in_3d_and_4d {
     )* };
 }
 
+mod directed;
 mod oracles;
 mod robustness;
 mod scenes;

@@ -150,6 +150,19 @@ pub fn monte_carlo<const D: usize>(
     simplices: &[[Vector<D>; D]],
     rays: usize,
 ) -> (f64, f64) {
+    let (_, mean, error) = monte_carlo_vector(rng, p, n, simplices, rays);
+    (mean, error)
+}
+
+/// The same beside the mean of direction times visibility.
+pub fn monte_carlo_vector<const D: usize>(
+    rng: &mut ChaCha8Rng,
+    p: &Vector<D>,
+    n: &Vector<D>,
+    simplices: &[[Vector<D>; D]],
+    rays: usize,
+) -> (Vector64<D>, f64, f64) {
+    let mut vector = Vector64::<D>::zeros();
     let cones: Vec<Cone<D>> = simplices
         .iter()
         .map(|s| match s.iter().position(|v| v == p) {
@@ -174,8 +187,12 @@ pub fn monte_carlo<const D: usize>(
             }
         };
         let direction = narrow(&direction);
-        open += usize::from(!cones.iter().any(|cone| cone.contains(&direction)));
+        if !cones.iter().any(|cone| cone.contains(&direction)) {
+            open += 1;
+            vector += widen(&direction);
+        }
     }
     let mean = open as f64 / rays as f64;
-    (mean, (mean * (1.0 - mean) / rays as f64).sqrt().max(1.0 / rays as f64))
+    let error = (mean * (1.0 - mean) / rays as f64).sqrt().max(1.0 / rays as f64);
+    (vector / rays as f64, mean, error)
 }

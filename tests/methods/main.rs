@@ -12,5 +12,6 @@ macro_rules! in_3d_and_4d {
 
 mod errors;
 mod exact;
+mod light;
 mod pipelines;
 mod scenes;

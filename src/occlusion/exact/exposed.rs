@@ -61,17 +61,17 @@ impl<'p> Counter<'p> {
 /// A region with the holes that may reach into it, and how many they were before it was last made smaller.
 type Task<const D: usize> = (Region<D>, Vec<u32>, usize);
 
-/// The solid angle of a region outside all holes; these are brought into order of size.
+/// Hands over the pieces of a region outside all holes; these are brought into order of size.
 pub(super) fn exposed<const D: usize>(
     region: Region<D>,
     holes: &mut [Hole<D>],
     counter: &mut Counter,
-) -> Result<f64, Spent> {
+    mut piece: impl FnMut(&Region<D>),
+) -> Result<(), Spent> {
     if region.is_flat() {
-        return Ok(0.0);
+        return Ok(());
     }
     holes.sort_by(|a, b| b.measure().total_cmp(&a.measure()));
-    let mut sum = 0.0;
     // Not by recursion: where thousands of holes meet in one point the stack would not do.
     let mut tasks: Vec<Task<D>> = vec![(region, (0..holes.len() as u32).collect(), usize::MAX)];
     while let Some((region, mut candidates, before)) = tasks.pop() {
@@ -95,7 +95,7 @@ pub(super) fn exposed<const D: usize>(
             continue;
         }
         let Some((&first, rest)) = candidates.split_first() else {
-            sum += region.measure();
+            piece(&region);
             continue;
         };
         // Halving helps where the holes part, not where all of them meet.
@@ -121,5 +121,5 @@ pub(super) fn exposed<const D: usize>(
             }
         }
     }
-    Ok(sum)
+    Ok(())
 }

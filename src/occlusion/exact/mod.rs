@@ -23,6 +23,8 @@
 //! generators' numbers tell without arithmetic. Of a mesh only its silhouette is left as seen from p, and the work
 //! goes with the silhouette and with what overlaps it, not with the square of all simplices.
 //!
+//! The vector b of the open directions ([`Hemisphere::directed`]) is a sum over the same pieces (`integrals.rs`).
+//!
 //! # Exact signs
 //! Which cones cross a plane, which touch it and on which side is read off signs of determinants, all exact: planes
 //! that coincide and planes that all but coincide (moved by one ulp) are treated as what they are, consistently
@@ -45,6 +47,7 @@ mod directions;
 mod exposed;
 mod generators;
 mod hemisphere;
+mod integrals;
 mod plane;
 mod polygon;
 mod precise;
@@ -54,4 +57,4 @@ mod view;
 
 pub(super) use hemisphere::Stopped;
 pub use hemisphere::{Budget, Hemisphere, OverBudget, visible_fraction};
-pub(super) use view::{value, value_if_simple};
+pub(super) use view::{directed, value, value_if_simple};

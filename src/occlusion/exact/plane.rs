@@ -198,12 +198,26 @@ impl<const D: usize> Chart<D> {
     /// The coordinates of a vector of the plane, as a unit vector.
     #[inline]
     pub fn flatten(&self, v: &Vector64<D>) -> Flat {
+        let flat = self.project(v);
+        flat / flat.norm()
+    }
+
+    /// The coordinates of a vector's projection to the plane.
+    #[inline]
+    pub fn project(&self, v: &Vector64<D>) -> Flat {
         let scale = self.factor * self.axis.dot(v);
         let mut flat = Flat::zeros();
         for i in 0..D - 1 {
             flat[i] = v[i] - scale * self.axis[i];
         }
         flat[0] *= self.handedness;
-        flat / flat.norm()
+        flat
+    }
+
+    /// The vector of the plane with these coordinates.
+    pub fn unflatten(&self, flat: &Flat) -> Vector64<D> {
+        let mut v = Vector64::<D>::from_fn(|r, _| if r < D - 1 { flat[r] } else { 0.0 });
+        v[0] *= self.handedness;
+        v - self.axis * (self.factor * self.axis.dot(&v))
     }
 }

@@ -70,7 +70,7 @@ impl<const D: usize> Region<D> {
     }
 
     /// Pairs of neighbouring corners, in order.
-    fn edges(&self) -> impl Iterator<Item = (Flat, Flat)> + '_ {
+    pub fn edges(&self) -> impl Iterator<Item = (Flat, Flat)> + '_ {
         let count = self.corners.len() - usize::from(!closes::<D>());
         (0..count).map(|i| (self.corners[i], self.corners[(i + 1) % self.corners.len()]))
     }

@@ -6,7 +6,7 @@
 use super::exposed::LOOK;
 use super::hemisphere::{Budget, Hemisphere, Stopped};
 use crate::accel::{Bvh, Tracer};
-use crate::geometry::{Aabb, Vector};
+use crate::geometry::{Aabb, Vector, Vector64};
 use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
 use crate::trace::ShadingPoint;
@@ -42,6 +42,23 @@ pub(in crate::occlusion) fn value_if_simple<const D: usize>(
         Err(Stopped::OverBudget(_)) => Ok(None),
         Err(Stopped::Cancelled) => Err(Cancelled),
     }
+}
+
+/// The value at a point and the vector beside it, if at most `most` simplices rise above its horizon. A vertex that belongs
+/// to no simplex has no direction: 1 and zero.
+pub(in crate::occlusion) fn directed<const D: usize>(
+    tracer: &Tracer<D>,
+    point: &ShadingPoint<D>,
+    most: usize,
+    budget: Budget,
+    progress: &dyn Progress,
+) -> Result<Option<(f64, Vector64<D>)>, Stopped> {
+    if point.normal(tracer.mesh()).amax() == 0.0 {
+        return Ok(Some((1.0, Vector64::zeros())));
+    }
+    let Some(hemisphere) = view(tracer, point, most, progress)? else { return Ok(None) };
+    let (fraction, vector) = hemisphere.directed_fraction(budget, progress)?;
+    Ok(Some((fraction.clamp(0.0, 1.0), vector)))
 }
 
 impl<const D: usize> Hemisphere<D> {

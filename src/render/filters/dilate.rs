@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use super::ImageFilter;
+use crate::geometry::Vector;
 use crate::occlusion::Error;
 use crate::progress::Progress;
 use crate::render::gbuffer::{Columns, GBuffer};
@@ -21,8 +22,8 @@ pub struct Dilate {
 }
 
 /// A voxel's values on their way outwards.
-#[derive(Clone, Copy, Debug, Default)]
-struct Value {
+#[derive(Clone, Copy, Debug)]
+struct Value<const D: usize> {
     /// How much it counts: opacity, or 1 where it was filled; 0 where there is nothing yet.
     weight: f32,
     albedo: [f32; 3],
@@ -31,6 +32,17 @@ struct Value {
     /// Black where all is opaque.
     behind: [f32; 3],
     occlusion: f32,
+    /// Zero where the picture has none of these.
+    direction: Vector<D>,
+    hidden: [f32; 3],
+}
+
+impl<const D: usize> Value<D> {
+    fn nothing() -> Self {
+        let black = [0.0; 3];
+        let direction = Vector::zeros();
+        Self { weight: 0.0, albedo: black, direct: black, behind: black, occlusion: 0.0, direction, hidden: black }
+    }
 }
 
 /// The empty voxels that have a neighbour, be it at a corner, that is not.
@@ -55,13 +67,13 @@ fn rim(filled: &[u8], [width, height, _]: [usize; 3]) -> Vec<usize> {
 }
 
 /// Takes some layers one step further: every voxel without a value that has a neighbour with one.
-fn step(values: &mut [Value], filled: &mut [u8], dimensions: [usize; 3]) {
+fn step<const D: usize>(values: &mut [Value<D>], filled: &mut [u8], dimensions: [usize; 3]) {
     let [width, height, _] = dimensions;
     let layers = values.len() / (width * height).max(1);
     let near = |i: usize, end: usize| i.saturating_sub(1)..=(i + 1).min(end - 1);
     let mean = |n: usize| {
         let (i, j, k) = (n % width, n / width % height, n / width / height);
-        let (mut sum, mut total) = (Value::default(), 0.0);
+        let (mut sum, mut total) = (Value::<D>::nothing(), 0.0f32);
         for (z, y) in near(k, layers).flat_map(|z| near(j, height).map(move |y| (z, y))) {
             for x in near(i, width) {
                 let value = &values[x + width * (y + height * z)];
@@ -76,13 +88,17 @@ fn step(values: &mut [Value], filled: &mut [u8], dimensions: [usize; 3]) {
                     sum.albedo[c] += weight * value.albedo[c];
                     sum.direct[c] += weight * value.direct[c];
                     sum.behind[c] += weight * value.behind[c];
+                    sum.hidden[c] += weight * value.hidden[c];
                 }
+                sum.direction += value.direction * weight;
             }
         }
-        let [albedo, direct, behind] = [sum.albedo, sum.direct, sum.behind].map(|sum| sum.map(|c| c / total));
-        Value { weight: 1.0, albedo, direct, behind, occlusion: sum.occlusion / total }
+        let [albedo, direct, behind, hidden] =
+            [sum.albedo, sum.direct, sum.behind, sum.hidden].map(|sum| sum.map(|c| c / total));
+        let (occlusion, direction) = (sum.occlusion / total, sum.direction / total);
+        Value { weight: 1.0, albedo, direct, behind, occlusion, direction, hidden }
     };
-    let found: Vec<(usize, Value)> =
+    let found: Vec<(usize, Value<D>)> =
         rim(filled, dimensions).into_par_iter().with_min_len(256).map(|n| (n, mean(n))).collect();
     for (n, value) in found {
         (values[n], filled[n]) = (value, 1);
@@ -103,11 +119,12 @@ impl<const D: usize> ImageFilter<D> for Dilate {
         // spoils moves inwards by a layer a step, and so stays within the halo.
         let value = |i: usize| {
             let (weight, albedo, occlusion) = (input.opacity(i), input.albedo[i], input.occlusion[i]);
-            let [direct, behind] =
-                [&input.direct, &input.behind].map(|column| column.get(i).copied().unwrap_or_default());
-            Value { weight, albedo, direct, behind, occlusion }
+            let [direct, behind, hidden] =
+                [&input.direct, &input.behind, &input.hidden].map(|column| column.get(i).copied().unwrap_or_default());
+            let direction = input.direction.get(i).copied().unwrap_or_else(Vector::zeros);
+            Value { weight, albedo, direct, behind, occlusion, direction, hidden }
         };
-        let mut values: Vec<Value> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
+        let mut values: Vec<Value<D>> = (0..input.len()).into_par_iter().with_min_len(4096).map(value).collect();
         let mut filled: Vec<u8> = values.iter().map(|value| u8::from(value.weight > 0.0)).collect();
         for _ in 0..self.layers {
             if progress.cancelled() {
@@ -124,6 +141,12 @@ impl<const D: usize> ImageFilter<D> for Dilate {
                 }
                 if let Some(behind) = out.behind.get_mut(i) {
                     *behind = value.behind;
+                }
+                if let Some(direction) = out.direction.get_mut(i) {
+                    *direction = value.direction;
+                }
+                if let Some(hidden) = out.hidden.get_mut(i) {
+                    *hidden = value.hidden;
                 }
             }
         }

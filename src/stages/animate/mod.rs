@@ -9,7 +9,7 @@
 
 mod path;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -28,7 +28,7 @@ use super::{Invalid, Keys, LeftOut, Needs, OneOrMany, Output, Plan, Ref, Resolve
 use super::{names, suggest};
 use crate::io::{self, AtomicFile, pvd};
 use crate::occlusion::Cancelled;
-use crate::render::Aov;
+use crate::render::{Aov, Skylight};
 use crate::text::number;
 
 pub use path::{Motion, MoveSpec, PathPlan, TurnSpec};
@@ -329,8 +329,17 @@ impl Stage for AnimatePlan {
                     if let Some(occlusion) = animation.occlusion.filter(|_| animation.shows_values(plan)) {
                         occlusion::values(occlusion, run, scene)?;
                     }
+                    let mut light = None;
                     for &i in &stale {
-                        let picture = frame(me, i, &animation.render(i, plan), run, scene)?;
+                        let render = animation.render(i, plan);
+                        // The light of other surfaces is another where the scene turns below its sky.
+                        let sky = render.lighting.as_ref().and_then(|lighting| lighting.sky.clone());
+                        let skylight = match light.take() {
+                            Some((known, skylight)) if known == sky => skylight,
+                            _ => scene.skylight(render.occlusion, render.light_asked(&animation.arrays), run)?,
+                        };
+                        light = Some((sky, skylight.clone()));
+                        let picture = frame(me, i, &render, run, scene, skylight)?;
                         made.add(picture, &format!("animate {}", plan.id(me)), run)?;
                     }
                 }
@@ -376,6 +385,10 @@ impl Sum {
             notes.push(format!("{name}: some frames show background only: {why}"));
         }
         notes.extend(picture.in_vain.iter().map(|told| format!("{name}: in some frames {told}")));
+        if let Some(light) = &picture.light {
+            let told = light.notes("some of the rays");
+            notes.extend(told.iter().map(|told| format!("{name}: in some frames {told}")));
+        }
         if picture.behind > 0 {
             notes.push(format!(
                 "{name}: in some frames voxels see a surface from behind, with the occlusion of its front; turn that object \
@@ -396,11 +409,12 @@ fn frame<const D: usize>(
     render: &RenderPlan,
     run: &Run,
     scene: &SceneRun<D>,
+    skylight: Option<Arc<Skylight<D>>>,
 ) -> Result<Picture, StageError> {
     let (plan, animation) = (run.plan, &run.plan[me]);
     let name = format!("animate {}, frame {} of {}", plan.id(me), i + 1, animation.files.len());
     let write = animation.write();
-    render.picture(&name, plan, scene, run.progress, |grid, hash| {
+    render.picture(&name, plan, scene, skylight, run.progress, |grid, hash| {
         PictureFiles::frame(&animation.files[i], &write, render, plan, run.told, grid, hash)
     })
 }
@@ -431,14 +445,15 @@ fn move_objects<const D: usize>(
     for &i in stale {
         let steps = animation.motion(i).steps();
         let mesh = bodies.moved(plan, objects, &steps, progress).map_err(stopped)?;
-        let mut moved = SceneRun { session: scene.session.with_mesh(mesh), values: BTreeMap::new() };
+        let mut moved = SceneRun::new(scene.session.with_mesh(mesh));
         if let Some((occlusion, computation)) = computation {
             let name = format!("animate {}, frame {}", plan.id(me), i + 1);
             let found = occlusion::values_for((&name, render), computation, run, &moved)?;
             made.rays += found.rays;
             moved.values.insert(occlusion, Arc::new(found));
         }
-        let picture = frame(me, i, render, run, &moved)?;
+        let skylight = moved.skylight(render.occlusion, render.light_asked(&animation.arrays), run)?;
+        let picture = frame(me, i, render, run, &moved, skylight)?;
         made.add(picture, &format!("animate {}", plan.id(me)), run)?;
     }
     Ok(())

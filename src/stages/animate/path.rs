@@ -199,6 +199,9 @@ impl Motion {
                 LightKind::Direction => self.direction(&light.vector, -1.0),
             };
         }
+        if let Some(gradient) = &mut lighting.sky {
+            *gradient = self.direction(gradient, -1.0);
+        }
         lighting
     }
 

@@ -24,7 +24,7 @@ use super::occlusion;
 use super::render::{RenderPlan, array_bytes};
 use super::scene::ScenePlan;
 use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, Vector};
 use crate::io::{AtomicFile, Error};
 use crate::mesh::Mesh;
 use crate::occlusion::Estimates;
@@ -83,7 +83,7 @@ trait OutputFormat {
         _told: &str,
         _mesh: &Mesh<D>,
         _camera: &Camera<D>,
-        _found: Option<&Estimates>,
+        _found: Found<D>,
     ) -> Result<(u64, usize), Error> {
         Ok((0, 0))
     }
@@ -111,6 +111,15 @@ impl Image {
 
 /// Writes the file at the path again, with another text of the pipeline; returns its length.
 pub(in crate::stages) type Retell = fn(&Path, &WritePlan, &str) -> Result<u64, Error>;
+
+/// What is known at the vertices of a mesh.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found<'a, const D: usize> {
+    /// Ambient occlusion.
+    pub values: Option<&'a Estimates>,
+    /// The vector b.
+    pub vectors: Option<&'a [Vector<D>]>,
+}
 
 /// What a file is opened with.
 struct Opening<'a> {
@@ -149,7 +158,7 @@ macro_rules! formats {
             pub input: Option<String>,
             $($(#[$doc])+ pub $key: Option<String>,)+
             /// What the `.vti` holds (default `[rgba, ambient_occlusion, opacity]`; also `coverage` where light passes objects,
-            /// and of a render with `layers` all arrays of layers).
+            /// and of a render with `layers` all arrays of layers). `bent_normal` is also put into the `.vtu`.
             pub arrays: Option<Vec<Aov>>,
             /// How the `.vti` stores numbers (default `appended`).
             pub encoding: Option<Encoding>,
@@ -213,7 +222,7 @@ macro_rules! formats {
                 told: &str,
                 mesh: &Mesh<D>,
                 camera: &Camera<D>,
-                found: Option<&Estimates>,
+                found: Found<D>,
             ) -> Result<(u64, usize), Error> {
                 match self { $(Self::$name => <$key::$name>::write_mesh(path, told, mesh, camera, found)),+ }
             }
@@ -314,6 +323,11 @@ impl Files {
 }
 
 impl WritePlan {
+    /// Whether its files have the vector b, at voxels or at vertices.
+    fn has_directions(&self) -> bool {
+        self.arrays_given && self.arrays.contains(&Aov::BentNormal)
+    }
+
     /// The names of the arrays that its image data hold, in that order.
     pub fn array_names(&self, plan: &Plan) -> Vec<String> {
         self.arrays.iter().flat_map(|aov| aov.names(plan[self.render].layers)).collect()
@@ -368,9 +382,10 @@ impl Stage for WritePlan {
             return Err(Invalid::new(path, format!("names no file; give at least one of {}", keys.join(", "))));
         }
         let arrays = arrays(spec.arrays.as_deref(), path, render, resolver)?;
+        let has_vtu = files.get(Format::Vtu).is_some();
         if files.get(Format::Vti).is_none() {
             let given = [
-                ("arrays", spec.arrays.is_some()),
+                ("arrays", spec.arrays.is_some() && !(has_vtu && arrays.contains(&Aov::BentNormal))),
                 ("encoding", spec.encoding.is_some()),
                 ("compression", spec.compression.is_some()),
             ];
@@ -410,7 +425,7 @@ impl Stage for WritePlan {
                     let render = plan[me].render;
                     let left_out: Vec<LeftOut> = RenderPlan::LEFT_OUT.iter().chain(MESH_LEFT_OUT).copied().collect();
                     let fields = super::key::without(plan.fields(me.index()), &own);
-                    keys.hash(&(keys.part(plan, render.index(), &left_out), fields))
+                    keys.hash(&(keys.part(plan, render.index(), &left_out), fields, plan[me].has_directions()))
                 }
             };
             let pipeline = format.tells_pipeline().then(|| keys.provenance());
@@ -486,9 +501,16 @@ impl Stage for WritePlan {
             if let Some(occlusion) = render.occlusion {
                 occlusion::values(occlusion, run, scene)?;
             }
+            let directions = match render.occlusion.filter(|_| write.has_directions()) {
+                Some(occlusion) => Some(scene.directions(occlusion, run)?),
+                None => None,
+            };
             let (mesh, camera) = (scene.session.mesh(), camera(&render.camera)?);
-            let values = render.occlusion.map(|occlusion| &*scene.values[&occlusion]);
-            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), run.told, mesh, &camera, values)?;
+            let found = Found {
+                values: render.occlusion.map(|occlusion| &*scene.values[&occlusion]),
+                vectors: directions.as_ref().map(|found| found.vectors.as_slice()),
+            };
+            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), run.told, mesh, &camera, found)?;
             let note = format!(
                 "{}: {left_out} of {} simplices are not wholly before the eye and are left out",
                 path.display(),
@@ -497,6 +519,17 @@ impl Stage for WritePlan {
             run.made(path, bytes, (left_out > 0).then_some(note).into_iter().collect())?;
         }
         Ok(String::new())
+    }
+}
+
+/// Why a render can't have this array, if so.
+fn refusal(array: Aov, plan: &Plan, render: Ref<RenderPlan>) -> Option<String> {
+    match array {
+        Aov::BentNormal => plan[render].no_directions(plan),
+        Aov::Bounce | Aov::BounceError if !plan[render].lighting.as_ref().is_some_and(|lighting| lighting.bounce) => {
+            Some(format!("render `{}` follows no light from surface to surface; give it `bounce: 1`", plan.id(render)))
+        }
+        _ => None,
     }
 }
 
@@ -531,7 +564,11 @@ pub(super) fn arrays(
         }
         if *array == Aov::Light && resolver.plan[render].lighting.is_none() {
             let id = resolver.plan.id(render);
-            let message = format!("render `{id}` is not lit; give it `lights`, `ambient` or `depth_cue`");
+            let message =
+                format!("render `{id}` is not lit; give it `lights`, `ambient`, `sky`, `bounce` or `depth_cue`");
+            return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
+        }
+        if let Some(message) = refusal(*array, &resolver.plan, render) {
             return Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
         }
     }

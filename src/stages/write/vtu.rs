@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use super::{Content, LeftOut, OutputFormat, Retell, WritePlan, copy_over};
+use super::{Content, Found, LeftOut, OutputFormat, Retell, WritePlan, copy_over};
 use crate::geometry::{Dimension, Vector};
 use crate::io::{AtomicFile, Error, PIPELINE, vtu};
 use crate::mesh::Mesh;
-use crate::occlusion::Estimates;
 use crate::render::Camera;
 use crate::volume::Array;
 
@@ -15,7 +14,10 @@ pub(super) struct Vtu;
 impl OutputFormat for Vtu {
     const CONTENT: Content = Content::Mesh;
     const LEFT_OUT: &'static [LeftOut] = &[
-        LeftOut::new("/arrays", "about `.vti` only; a `.vtu` has those of the mesh"),
+        LeftOut::new(
+            "/arrays",
+            "a `.vtu` has those of the mesh, and of these `bent_normal` only, which takes part by itself",
+        ),
         LeftOut::new("/encoding", "about `.vti` only"),
         LeftOut::new("/compression", "about `.vti` only"),
     ];
@@ -26,7 +28,7 @@ impl OutputFormat for Vtu {
         told: &str,
         mesh: &Mesh<D>,
         camera: &Camera<D>,
-        found: Option<&Estimates>,
+        found: Found<D>,
     ) -> Result<(u64, usize), Error> {
         let mut before = vec![true; mesh.vertices.len()];
         let mut points = vec![[0.0f32; 3]; mesh.vertices.len()];
@@ -66,7 +68,7 @@ pub(in crate::stages) fn write<const D: usize>(
     mesh: &Mesh<D>,
     points: &[[f32; 3]],
     simplices: &[[u32; D]],
-    found: Option<&Estimates>,
+    found: Found<D>,
 ) -> Result<u64, Error> {
     let coordinates = |vectors: &[Vector<D>]| -> Vec<f32> { vectors.iter().flatten().copied().collect() };
     let mut object = vec![0u16; mesh.vertices.len()];
@@ -78,12 +80,15 @@ pub(in crate::stages) fn write<const D: usize>(
         Array::new("normal", D, coordinates(&mesh.normals)),
         Array::new("object", 1, object),
     ];
-    if let Some(found) = found {
+    if let Some(found) = found.values {
         arrays.push(Array::new("ambient_occlusion", 1, found.values.clone()));
         // Of loaded values nothing is known.
         if found.errors.len() == found.values.len() {
             arrays.push(Array::new("occlusion_error", 1, found.errors.clone()));
         }
+    }
+    if let Some(vectors) = found.vectors {
+        arrays.push(Array::new("bent_normal", D, coordinates(vectors)));
     }
     let texts = [(PIPELINE, told)];
     let mut file = AtomicFile::create(path)?;

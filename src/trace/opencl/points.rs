@@ -76,7 +76,7 @@ impl<const D: usize> OpenClBackend<D> {
             ignored: ignored.first().copied().unwrap_or(NOTHING),
             // The kernel knows of one.
             serves: self.serves && ignored.len() <= 1 && is_exact(&self.scale, &position),
-            star: star_cones(&self.tracer, point).into_iter().filter_map(star_cone).collect(),
+            star: star_cones(&self.tracer, point).into_iter().filter_map(|(_, cone)| star_cone(cone)).collect(),
         }
     }
 
