@@ -739,7 +739,7 @@ fn damaged_files_are_refused_by_name() {
     infinite[84 + 12..84 + 16].copy_from_slice(&f32::INFINITY.to_le_bytes());
     refused("infinite.stl", &infinite, "point 0 is not finite: (inf, 0, 0)");
     let ply = ascii_ply();
-    refused("index.ply", ply.replace("3 1 2 3", "3 1 2 4").as_bytes(), "triangle 3 names point 4 of 4");
+    refused("index.ply", ply.replace("3 1 2 3", "3 1 2 4").as_bytes(), "cell 3 names point 4 of 4");
     refused("negative.ply", ply.replace("3 1 2 3", "3 1 2 -3").as_bytes(), "face 3 has no list");
     refused("two.ply", ply.replace("3 1 2 3", "2 1 2").as_bytes(), "face 3 has 2 vertices");
     refused("count.ply", ply.replace("vertex 4", "vertex 4000000000").as_bytes(), "it declares 4000000000 times");
