@@ -1,4 +1,4 @@
-//! The six regular polytopes of R^4; in R^3 the polyhedra of [`super::polyhedron`].
+//! The six regular polytopes of R^4; in R^3 the polyhedra of `polyhedron`.
 //!
 //! Each is given by its vertices and by the directions of its cells: a cell's vertices are those that lie furthest along
 //! its direction. Polytopes come in dual pairs, whose cells are in the directions of the other's vertices: 8 and 16, 120

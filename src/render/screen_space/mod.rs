@@ -3,7 +3,7 @@
 //!
 //! A point looks along lines of the image that start at its voxel. Each is the image of half a slice, a half-plane through
 //! the line of sight; what voxels on it show lies at some angle from the direction to the eye, and hides the sectors of the
-//! slice between that and where it is thought to end, a `thickness` further from the eye ([`sectors`]). An image of a 4D
+//! slice between that and where it is thought to end, a `thickness` further from the eye (`sectors`). An image of a 4D
 //! scene has two dimensions more than a line, one of a 3D scene one more; the weight of angles follows from that, and the
 //! code is the same.
 //!
