@@ -18,6 +18,7 @@ use self::layout::{Layout, Page};
 use super::axes::{Axis, Opened, Role};
 use super::numbers::{Bytes, Meaning, Numbers, Packing, stream};
 use super::{Request, holds, room_for};
+use crate::text::shortened;
 use crate::volume::Kind;
 
 /// The most points that come out of a byte: Zstandard makes 128 KiB of four bytes, and a point takes one bit at least.
@@ -27,10 +28,11 @@ const MOST_POINTS_A_BYTE: u64 = 8 << 15;
 fn told(error: &TiffError) -> String {
     match error {
         TiffError::UnsupportedError(what) => {
-            format!("unsupported: {what}; convert it: tiffcp -c lzw IN.tif OUT.tif")
+            // A list that a damaged page gives for its format may be as long as the file.
+            format!("unsupported: {}; convert it: tiffcp -c lzw IN.tif OUT.tif", shortened(&what.to_string(), 200))
         }
         TiffError::LimitsExceeded => "unsupported: a page larger than can be held".into(),
-        error => format!("is cut off, or damaged: {error}"),
+        error => format!("is cut off, or damaged: {}", shortened(&error.to_string(), 200)),
     }
 }
 
