@@ -72,6 +72,7 @@ const KNOWN_CIRCLES: &[&[&str]] = &[
     // Stages name the stages that they work on, and each plan all of them.
     &[
         "stages/occlusion.rs",
+        "stages/picture.rs",
         "stages/prepare.rs",
         "stages/render.rs",
         "stages/run.rs",

@@ -49,6 +49,13 @@ pub struct Output {
     pub tells: Option<PathBuf>,
 }
 
+impl Output {
+    /// A file that stands alone, and tells of the pipeline itself.
+    pub fn alone(file: &Path, key: String) -> Self {
+        Self { file: file.to_owned(), beside: Vec::new(), key, tells: Some(file.to_owned()) }
+    }
+}
+
 /// A file changed within this time before it was hashed may change again without its times telling.
 const COARSE: Duration = Duration::from_secs(2);
 /// Bytes hashed at a time.

@@ -81,8 +81,7 @@ impl Stage for MeshPlan {
     }
 
     fn outputs(me: Ref<Self>, plan: &Plan, keys: &Keys) -> Vec<Output> {
-        let file = plan[me].file.clone();
-        vec![Output { beside: Vec::new(), key: keys.of(me.index()).to_owned(), tells: Some(file.clone()), file }]
+        vec![Output::alone(&plan[me].file, keys.of(me.index()).to_owned())]
     }
 
     fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {

@@ -33,6 +33,7 @@ mod names;
 pub mod occlusion;
 mod one_or_many;
 pub mod paraview;
+mod picture;
 mod plan;
 pub mod prepare;
 mod range;

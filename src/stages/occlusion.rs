@@ -14,6 +14,7 @@ use serde_json::{Map, Value, json};
 
 use super::describe::{Counts, Totals, grouped};
 use super::key::without;
+use super::picture::mark_seen;
 use super::prepare::{Loaded, errors_path, kept, sidecar_path};
 use super::range::positive;
 use super::render::{self, RenderPlan};
@@ -400,7 +401,7 @@ pub(super) fn values_for<const D: usize>(
     let count = scene.session.mesh().vertices.len();
     let mut left = computation.most_rays().saturating_mul(count as u64) / 4;
     let mut mask = vec![false; count];
-    let mask = render::mark_seen(picture, run, scene, &mut left, &mut mask)?.then_some(mask);
+    let mask = mark_seen(picture, run, scene, &mut left, &mut mask)?.then_some(mask);
     let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
     let _running = run.progress.stage(&format!("occlusion of {}", picture.0), asked as u64);
     Ok(scene.session.occlusion(computation.estimator(), mask.as_deref(), run.progress)?)
@@ -441,7 +442,7 @@ fn mask<const D: usize>(
     for (stage, render) in plan.all::<RenderPlan>() {
         let values = render.occlusion == Some(me) && render.shading != render::Shading::Voxel;
         if values && render::is_stale(stage, plan, &|file| run.is_stale(file)) {
-            let seen = render::mark_seen((plan.id(stage), render), run, scene, &mut left, &mut mask)?;
+            let seen = mark_seen((plan.id(stage), render), run, scene, &mut left, &mut mask)?;
             if !seen {
                 return Ok(None);
             }

@@ -123,7 +123,7 @@ impl Stage for SlicePlan {
         let key = keys.of(me.index());
         let slice = |(file, at): (&PathBuf, &f64)| {
             let key = keys.hash(&(key, at));
-            Output { beside: Vec::new(), key, tells: Some(file.clone()), file: file.clone() }
+            Output::alone(file, key)
         };
         let list = list.iter().map(|file| {
             let key = keys.hash(&(key, file_names(files)));

@@ -23,15 +23,13 @@
 //! Of independent rays, none out of N going the other way means, at 95 %, a share below
 //! 3/N (the rule of three), which are two standard errors of 1.5/N: no estimate is below that.
 
+use super::groups::Groups;
 use super::noise;
 use super::sampling::{Sampler, Target};
 use crate::geometry::Dimension;
 
 /// How much more even several groups are together, as a share of the exponent that the rate of convergence gives.
 pub(super) const GAIN: f64 = 0.6;
-
-/// Groups there are, once as many rays are known.
-pub(super) const LEAST_GROUPS: usize = 8;
 
 /// A value, and how sure it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,17 +64,10 @@ impl Target {
     }
 }
 
-/// Counts of rays that escape, by group. Groups grow as rays come in, so their number need not be known before.
+/// Counts of rays that escape, by group.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Accumulator {
-    /// Rays of each finished group that escape.
-    groups: [u32; 2 * LEAST_GROUPS],
-    finished: usize,
-    /// Rays a group.
-    size: u32,
-    /// Rays of the unfinished group, and how many of them escape.
-    begun: u32,
-    open: u32,
+    groups: Groups<u32>,
     /// In what space rays are even; none if they know nothing of each other.
     even_in: Option<Dimension>,
 }
@@ -84,51 +75,32 @@ pub(crate) struct Accumulator {
 impl Accumulator {
     /// For rays of this sampler in a space of this dimension.
     pub fn new(sampler: Sampler, dimension: Dimension) -> Self {
-        let even_in = (sampler == Sampler::Sobol).then_some(dimension);
-        Self { groups: [0; 2 * LEAST_GROUPS], finished: 0, size: 1, begun: 0, open: 0, even_in }
+        Self { groups: Groups::new(), even_in: (sampler == Sampler::Sobol).then_some(dimension) }
     }
 
     /// Whether the order of the next 64 rays matters: groups are smaller than that.
     pub fn is_fine(&self) -> bool {
-        self.size < u64::BITS
+        self.groups.size() < u64::BITS
     }
 
     /// The next `count` rays; the lowest bits of `open` tell which of them escape.
     pub fn add(&mut self, mut open: u64, mut count: u32) {
         while count > 0 {
-            let taken = count.min(self.size - self.begun).min(u64::BITS);
-            self.open += (open & (u64::MAX >> (u64::BITS - taken))).count_ones();
-            self.begun += taken;
+            let taken = count.min(self.groups.room()).min(u64::BITS);
+            self.groups.add(taken, (open & (u64::MAX >> (u64::BITS - taken))).count_ones());
             count -= taken;
             open = open.checked_shr(taken).unwrap_or(0);
-            if self.begun == self.size {
-                self.groups[self.finished] = self.open;
-                self.finished += 1;
-                (self.begun, self.open) = (0, 0);
-                if self.finished == self.groups.len() {
-                    self.join();
-                }
-            }
         }
-    }
-
-    /// Makes one group of every two neighbours.
-    fn join(&mut self) {
-        for i in 0..LEAST_GROUPS {
-            self.groups[i] = self.groups[2 * i] + self.groups[2 * i + 1];
-        }
-        self.finished = LEAST_GROUPS;
-        self.size *= 2;
     }
 
     /// Rays so far.
     pub fn rays(&self) -> u32 {
-        self.finished as u32 * self.size + self.begun
+        self.groups.rays()
     }
 
     /// How many of them escape.
     pub fn escaped(&self) -> u32 {
-        self.groups[..self.finished].iter().sum::<u32>() + self.open
+        self.groups.sum()
     }
 
     /// The standard error, at most 1.
@@ -137,7 +109,7 @@ impl Accumulator {
         let variance = match self.even_in {
             None => self.variance_of_rays().max(bound(self.rays()).powi(2)),
             Some(dimension) => {
-                let together = libm::pow(self.groups(), -GAIN / dimension.pick(2.0, 3.0));
+                let together = libm::pow(rays / f64::from(self.groups.size()), -GAIN / dimension.pick(2.0, 3.0));
                 let groups = self.variance_of_groups() * together;
                 let value = (f64::from(self.escaped()) + 0.5) / (rays + 1.0);
                 groups.max(0.5 * noise::of_even_rays(dimension, value, rays))
@@ -156,11 +128,6 @@ impl Accumulator {
         variance.sqrt().max(bound(self.rays())).min(1.0).max(self.error())
     }
 
-    /// How many groups there are, the unfinished one in part.
-    fn groups(&self) -> f64 {
-        f64::from(self.rays()) / f64::from(self.size)
-    }
-
     fn variance_of_rays(&self) -> f64 {
         let (rays, escaped) = (f64::from(self.rays()), f64::from(self.escaped()));
         escaped * (rays - escaped) / (rays * rays) / (rays - 1.0).max(1.0)
@@ -168,12 +135,12 @@ impl Accumulator {
 
     /// From whole numbers, so that the order of the groups doesn't matter.
     fn variance_of_groups(&self) -> f64 {
-        let groups = &self.groups[..self.finished];
+        let groups = self.groups.finished();
         let count = groups.len() as f64;
         let sum: u64 = groups.iter().map(|&g| u64::from(g)).sum();
         let squares: u64 = groups.iter().map(|&g| u64::from(g) * u64::from(g)).sum();
         let scatter = (groups.len() as u64 * squares - sum * sum) as f64 / count;
-        let grouped = count * f64::from(self.size);
+        let grouped = count * f64::from(self.groups.size());
         // Of all rays, those of an unfinished group too.
         let share = grouped / f64::from(self.rays());
         scatter * count / (count - 1.0).max(1.0) / (grouped * grouped) * share

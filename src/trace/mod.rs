@@ -16,6 +16,7 @@ mod backend;
 pub mod cpu;
 mod estimate;
 mod gather;
+mod groups;
 mod noise;
 pub mod opencl;
 mod point;

@@ -1,22 +1,16 @@
 //! How sure a sampled value is whose rays are let through in part: [`Accumulator`](super::estimate::Accumulator) for numbers
 //! between 0 and 1. Of rays that are let through whole or not at all it gives the same bits.
 
-use super::estimate::{Estimate, GAIN, LEAST_GROUPS, bound};
+use super::estimate::{Estimate, GAIN, bound};
+use super::groups::Groups;
 use super::noise;
 use super::sampling::{Sampler, Target};
 use crate::geometry::Dimension;
 
-/// Sums of what rays bring, by group; groups grow as rays come in.
+/// Sums of what rays bring, by group.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shares {
-    /// The sum of each finished group.
-    groups: [f64; 2 * LEAST_GROUPS],
-    finished: usize,
-    /// Rays a group.
-    size: u32,
-    /// Rays of the unfinished group, and their sum.
-    begun: u32,
-    open: f64,
+    groups: Groups<f64>,
     /// The sum of all rays' squares.
     squares: f64,
     /// In what space rays are even; none if they know nothing of each other.
@@ -26,37 +20,22 @@ pub(super) struct Shares {
 impl Shares {
     /// For rays of this sampler in a space of this dimension.
     pub fn new(sampler: Sampler, dimension: Dimension) -> Self {
-        let even_in = (sampler == Sampler::Sobol).then_some(dimension);
-        Self { groups: [0.0; 2 * LEAST_GROUPS], finished: 0, size: 1, begun: 0, open: 0.0, squares: 0.0, even_in }
+        Self { groups: Groups::new(), squares: 0.0, even_in: (sampler == Sampler::Sobol).then_some(dimension) }
     }
 
     /// The next ray, of which this share gets through.
     pub fn add(&mut self, share: f64) {
-        self.open += share;
+        self.groups.add(1, share);
         self.squares += share * share;
-        self.begun += 1;
-        if self.begun < self.size {
-            return;
-        }
-        self.groups[self.finished] = self.open;
-        self.finished += 1;
-        (self.begun, self.open) = (0, 0.0);
-        if self.finished == self.groups.len() {
-            for i in 0..LEAST_GROUPS {
-                self.groups[i] = self.groups[2 * i] + self.groups[2 * i + 1];
-            }
-            self.finished = LEAST_GROUPS;
-            self.size *= 2;
-        }
     }
 
     /// Rays so far.
     pub fn rays(&self) -> u32 {
-        self.finished as u32 * self.size + self.begun
+        self.groups.rays()
     }
 
     fn sum(&self) -> f64 {
-        self.groups[..self.finished].iter().sum::<f64>() + self.open
+        self.groups.sum()
     }
 
     /// The standard error, at most 1.
@@ -65,7 +44,7 @@ impl Shares {
         let variance = match self.even_in {
             None => self.variance_of_rays().max(bound(self.rays()).powi(2)),
             Some(dimension) => {
-                let together = libm::pow(rays / f64::from(self.size), -GAIN / dimension.pick(2.0, 3.0));
+                let together = libm::pow(rays / f64::from(self.groups.size()), -GAIN / dimension.pick(2.0, 3.0));
                 let value = (self.sum() + 0.5) / (rays + 1.0);
                 (self.variance_of_groups() * together).max(0.5 * noise::of_even_rays(dimension, value, rays))
             }
@@ -79,12 +58,12 @@ impl Shares {
     }
 
     fn variance_of_groups(&self) -> f64 {
-        let groups = &self.groups[..self.finished];
+        let groups = self.groups.finished();
         let count = groups.len() as f64;
         let sum: f64 = groups.iter().sum();
         let squares: f64 = groups.iter().map(|g| g * g).sum();
         let scatter = (count * squares - sum * sum).max(0.0) / count;
-        let grouped = count * f64::from(self.size);
+        let grouped = count * f64::from(self.groups.size());
         scatter * count / (count - 1.0).max(1.0) / (grouped * grouped) * (grouped / f64::from(self.rays()))
     }
 

@@ -21,7 +21,8 @@ use serde_json::{Value, json};
 use self::path::PathKeys;
 use super::describe::{Counts, Totals, grouped, size};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
-use super::render::{Picture, RenderPlan, Shading};
+use super::picture::Picture;
+use super::render::{RenderPlan, Shading};
 use super::scene::{Bodies, ScenePlan};
 use super::write::{self, Compression, Encoding, Files, Format, PictureFiles, WritePlan};
 use super::{Invalid, Keys, LeftOut, Needs, OneOrMany, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
@@ -247,7 +248,7 @@ impl Stage for AnimatePlan {
         let key = keys.of(me.index());
         let frame = |(i, file): (usize, &PathBuf)| {
             let key = keys.hash(&(key, animation.motion(i), keys.provenance()));
-            Output { beside: Vec::new(), key, tells: Some(file.clone()), file: file.clone() }
+            Output::alone(file, key)
         };
         let mut outputs: Vec<Output> = animation.files.iter().enumerate().map(frame).collect();
         let times: Vec<f64> = animation.times().collect();
