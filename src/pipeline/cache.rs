@@ -75,11 +75,6 @@ impl Cache {
         !self.force && known.is_some_and(|e| e.key == key && found() == Some((e.bytes, e.modified.clone())))
     }
 
-    /// Whether the file was left by a run that had another key for it.
-    pub fn is_of_another(&self, file: &Path, key: &str) -> bool {
-        self.entries.get(&file.to_string_lossy()[..]).is_some_and(|entry| entry.key != key)
-    }
-
     /// Whether the file tells of the pipeline what has this hash.
     pub fn tells(&self, file: &Path, told: &str) -> bool {
         self.entries.get(&file.to_string_lossy()[..]).is_some_and(|entry| entry.told.as_deref() == Some(told))

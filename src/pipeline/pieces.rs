@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::Pipeline;
 use super::cache::Cache;
 use crate::io;
+use crate::stages::key::program;
 use crate::stages::piece::{self, Joined, MOST};
 use crate::stages::write::{PROGRAM, write_whole};
 use crate::stages::{Keys, Piece, Plan};
@@ -67,13 +68,15 @@ pub enum PiecesError {
 #[derive(Serialize, Deserialize, PartialEq)]
 struct Told {
     program: String,
+    /// Which build of that.
+    build: String,
     pipeline: String,
 }
 
 /// Lets a piece tell what it is of.
 pub(super) fn tell(plan: &Plan, text: &str) -> Result<(), io::Error> {
     let path = plan.out.join(NAME);
-    let told = Told { program: PROGRAM.to_owned(), pipeline: text.to_owned() };
+    let told = Told { program: PROGRAM.to_owned(), build: program(), pipeline: text.to_owned() };
     if read(&path).is_some_and(|known| known == told) {
         return Ok(());
     }
@@ -125,12 +128,6 @@ pub(super) fn check(pipeline: &Pipeline, keys: &Keys, text: &str, joined: &Joine
                 why.get_or_insert(difference);
                 foreign.push(piece.index());
             }
-            None if files().any(|(file, key)| cache.is_of_another(file, key)) => {
-                why.get_or_insert_with(|| {
-                    "it was made by another build of the program, or its files are of other inputs".to_owned()
-                });
-                foreign.push(piece.index());
-            }
             None => missing.push(piece.index()),
         }
     }
@@ -151,9 +148,10 @@ fn difference(told: &Told, text: &str) -> Option<String> {
         return Some(format!("it was made by {}, and this is {PROGRAM}", told.program));
     }
     let (mut theirs, mut ours) = (told.pipeline.lines(), text.lines());
+    let build = || "it was made by another build of the program, whose file has another length or time".to_owned();
     loop {
         match (theirs.next(), ours.next()) {
-            (None, None) => return None,
+            (None, None) => return (told.build != program()).then(build),
             (a, b) if a == b => {}
             (a, b) => {
                 let line = |line: Option<&str>| line.map_or("nothing".to_owned(), |l| format!("`{}`", shortened(l.trim(), 80)));
@@ -195,7 +193,11 @@ mod tests {
 
     #[test]
     fn a_difference_is_told_by_its_line() {
-        let told = |program: &str, pipeline: &str| Told { program: program.to_owned(), pipeline: pipeline.to_owned() };
+        let told = |name: &str, pipeline: &str| {
+            Told { program: name.to_owned(), build: program(), pipeline: pipeline.to_owned() }
+        };
+        let other = Told { build: "other".to_owned(), ..told(PROGRAM, "") };
+        assert!(difference(&other, "").unwrap().contains("another build"));
         assert_eq!(difference(&told(PROGRAM, "seed: 1\n"), "seed: 1\n"), None);
         let seed = difference(&told(PROGRAM, "name: a\nseed: 2\n"), "name: a\nseed: 1\n").unwrap();
         assert_eq!(seed, "its pipeline says `seed: 2` where this one says `seed: 1`");

@@ -13,6 +13,7 @@ use super::animate::AnimatePlan;
 use super::camera::camera;
 use super::cut::{Axis, Cut};
 use super::describe::Counts;
+use super::piece;
 use super::range::check_length;
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
@@ -274,7 +275,8 @@ impl Stage for FigurePlan {
     /// Writes the state, if it isn't there already.
     fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
         let (plan, figure) = (run.plan, &run.plan[me]);
-        if plan.piece.is_some() {
+        // Of pieces the first shows the parts of all, where parts are listed.
+        if plan.piece.is_some_and(|piece| piece.index() > 0 || !figure.has_parts()) {
             return Ok("made when the pieces are joined".to_owned());
         }
         let state = state(plan, figure)?;
@@ -286,6 +288,13 @@ impl Stage for FigurePlan {
         let bytes = state.len() as u64;
         run.ledger.record(Made { file: &figure.state, bytes, notes: Vec::new(), named: true, unchanged })?;
         Ok(String::new())
+    }
+}
+
+impl FigurePlan {
+    /// Whether it can show the parts of a run's pieces: their lists are those of images, and films have none.
+    fn has_parts(&self) -> bool {
+        self.reader == Reader::Vti && self.writes.iter().all(|shown| matches!(shown, Shown::Image(_)))
     }
 }
 
@@ -426,6 +435,8 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             Shown::Image(write) => plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref()),
             Shown::Animation(animation) => &plan[animation].list,
         };
+        let list = plan.piece.map(|_| piece::list_of(file));
+        let file = list.as_deref().unwrap_or(file);
         let caption = match (figure.writes.len(), render.is_dark()) {
             (1, _) => String::new(),
             (2, _) if twins => if plan.is_twin(write.index()) { "in 3D" } else { "in 4D" }.to_owned(),

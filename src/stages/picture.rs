@@ -65,12 +65,11 @@ impl RenderPlan {
     /// Values at vertices must be known where they are shown, and the light of the sky and of other surfaces found.
     pub(super) fn picture<const D: usize>(
         &self,
-        name: &str,
+        (name, part): (&str, Option<Slab>),
         plan: &Plan,
         scene: &SceneRun<D>,
         skylight: Option<Arc<Skylight<D>>>,
         progress: &dyn Progress,
-        part: Option<Slab>,
         open: impl FnOnce(&Grid, &str) -> Result<PictureFiles, io::Error>,
     ) -> Result<Picture, StageError> {
         let render = self;

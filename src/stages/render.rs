@@ -406,7 +406,7 @@ impl Stage for RenderPlan {
         }
         let skylight = scene.skylight(render.occlusion, render.light_asked(&render.arrays), run)?;
         let name = format!("render {}", plan.id(me));
-        let made = render.picture(&name, plan, scene, skylight, run.progress, slab, |grid, hash| {
+        let made = render.picture((&name, slab), plan, scene, skylight, run.progress, |grid, hash| {
             PictureFiles::create(me, run, grid, first_layer, hash)
         })?;
         run.work.voxels += made.voxels;

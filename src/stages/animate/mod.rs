@@ -439,7 +439,7 @@ fn frame<const D: usize>(
     let (plan, animation) = (run.plan, &run.plan[me]);
     let name = format!("animate {}, frame {} of {}", plan.id(me), i + 1, animation.files.len());
     let write = animation.write();
-    render.picture(&name, plan, scene, skylight, run.progress, None, |grid, hash| {
+    render.picture((&name, None), plan, scene, skylight, run.progress, |grid, hash| {
         PictureFiles::frame(&animation.files[i], &write, render, plan, run.told, grid, hash)
     })
 }
