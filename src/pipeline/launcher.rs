@@ -32,7 +32,9 @@ impl Launched {
             None => Ok(None),
             Some(text) => match text.parse::<u64>() {
                 Ok(number) => Ok(Some(number)),
-                Err(_) => Err(format!("{name} is \"{}\", which is no number; {REMEDY}", crate::text::shortened(&text, 40))),
+                Err(_) => {
+                    Err(format!("{name} is \"{}\", which is no number; {REMEDY}", crate::text::shortened(&text, 40)))
+                }
             },
         };
         for (rank, size) in [("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE")] {
@@ -57,7 +59,11 @@ impl Launched {
             match tasks {
                 Some(1) => {}
                 Some(n) => return Self::piece(k, n, "PMIX_RANK and Slurm's number of tasks"),
-                None => return Err(format!("PMIX_RANK says that this is process {k}, and nothing says of how many; {REMEDY}")),
+                None => {
+                    return Err(format!(
+                        "PMIX_RANK says that this is process {k}, and nothing says of how many; {REMEDY}"
+                    ));
+                }
             }
         }
         let mut note = None;
@@ -135,21 +141,95 @@ mod tests {
             (&[("PMI_RANK", "3"), ("PMI_SIZE", "8")], "3/8"),
             (&[("PMI_RANK", "0"), ("PMI_SIZE", "1"), ("PMIX_RANK", "0")], "whole"),
             // srun.
-            (&[("SLURM_JOB_ID", "9"), ("SLURM_STEP_ID", "0"), ("SLURM_PROCID", "0"), ("SLURM_NTASKS", "4"), ("SLURM_STEP_NUM_TASKS", "4")], "0/4"),
-            (&[("SLURM_JOB_ID", "9"), ("SLURM_STEP_ID", "1"), ("SLURM_PROCID", "3"), ("SLURM_NTASKS", "8"), ("SLURM_STEP_NUM_TASKS", "4"), ("PMIX_RANK", "3")], "3/4"),
-            (&[("SLURM_JOB_ID", "9"), ("SLURM_STEP_ID", "0"), ("SLURM_PROCID", "0"), ("SLURM_NTASKS", "8"), ("SLURM_STEP_NUM_TASKS", "1")], "whole"),
+            (
+                &[
+                    ("SLURM_JOB_ID", "9"),
+                    ("SLURM_STEP_ID", "0"),
+                    ("SLURM_PROCID", "0"),
+                    ("SLURM_NTASKS", "4"),
+                    ("SLURM_STEP_NUM_TASKS", "4"),
+                ],
+                "0/4",
+            ),
+            (
+                &[
+                    ("SLURM_JOB_ID", "9"),
+                    ("SLURM_STEP_ID", "1"),
+                    ("SLURM_PROCID", "3"),
+                    ("SLURM_NTASKS", "8"),
+                    ("SLURM_STEP_NUM_TASKS", "4"),
+                    ("PMIX_RANK", "3"),
+                ],
+                "3/4",
+            ),
+            (
+                &[
+                    ("SLURM_JOB_ID", "9"),
+                    ("SLURM_STEP_ID", "0"),
+                    ("SLURM_PROCID", "0"),
+                    ("SLURM_NTASKS", "8"),
+                    ("SLURM_STEP_NUM_TASKS", "1"),
+                ],
+                "whole",
+            ),
             (&[("SLURM_PROCID", "1"), ("SLURM_NTASKS", "4")], "1/4"),
             (&[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "4")], "0/4"),
             // A batch script of one task, and mpirun in one of several.
             (&[("SLURM_JOB_ID", "9"), ("SLURM_PROCID", "0"), ("SLURM_NTASKS", "1")], "whole"),
-            (&[("SLURM_JOB_ID", "9"), ("SLURM_PROCID", "0"), ("SLURM_NTASKS", "8"), ("OMPI_COMM_WORLD_RANK", "5"), ("OMPI_COMM_WORLD_SIZE", "8")], "5/8"),
+            (
+                &[
+                    ("SLURM_JOB_ID", "9"),
+                    ("SLURM_PROCID", "0"),
+                    ("SLURM_NTASKS", "8"),
+                    ("OMPI_COMM_WORLD_RANK", "5"),
+                    ("OMPI_COMM_WORLD_SIZE", "8"),
+                ],
+                "5/8",
+            ),
             // Arrays.
-            (&[("SLURM_JOB_ID", "9"), ("SLURM_PROCID", "0"), ("SLURM_NTASKS", "1"), ("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_TASK_COUNT", "4"), ("SLURM_ARRAY_TASK_MIN", "0"), ("SLURM_ARRAY_TASK_MAX", "3"), ("SLURM_ARRAY_TASK_STEP", "1")], "3/4"),
-            (&[("SLURM_ARRAY_TASK_ID", "17"), ("SLURM_ARRAY_TASK_COUNT", "3"), ("SLURM_ARRAY_TASK_MIN", "7"), ("SLURM_ARRAY_TASK_MAX", "17"), ("SLURM_ARRAY_TASK_STEP", "5")], "2/3"),
+            (
+                &[
+                    ("SLURM_JOB_ID", "9"),
+                    ("SLURM_PROCID", "0"),
+                    ("SLURM_NTASKS", "1"),
+                    ("SLURM_ARRAY_TASK_ID", "3"),
+                    ("SLURM_ARRAY_TASK_COUNT", "4"),
+                    ("SLURM_ARRAY_TASK_MIN", "0"),
+                    ("SLURM_ARRAY_TASK_MAX", "3"),
+                    ("SLURM_ARRAY_TASK_STEP", "1"),
+                ],
+                "3/4",
+            ),
+            (
+                &[
+                    ("SLURM_ARRAY_TASK_ID", "17"),
+                    ("SLURM_ARRAY_TASK_COUNT", "3"),
+                    ("SLURM_ARRAY_TASK_MIN", "7"),
+                    ("SLURM_ARRAY_TASK_MAX", "17"),
+                    ("SLURM_ARRAY_TASK_STEP", "5"),
+                ],
+                "2/3",
+            ),
             (&[("SLURM_ARRAY_TASK_ID", "0"), ("SLURM_ARRAY_TASK_COUNT", "1"), ("SLURM_ARRAY_TASK_MIN", "0")], "whole"),
             // mpirun in each task of an array: the nearer one counts.
-            (&[("SLURM_ARRAY_TASK_ID", "1"), ("SLURM_ARRAY_TASK_COUNT", "4"), ("OMPI_COMM_WORLD_RANK", "1"), ("OMPI_COMM_WORLD_SIZE", "2")], "1/2"),
-            (&[("SLURM_ARRAY_TASK_ID", "1"), ("SLURM_ARRAY_TASK_COUNT", "4"), ("OMPI_COMM_WORLD_RANK", "0"), ("OMPI_COMM_WORLD_SIZE", "1")], "1/4"),
+            (
+                &[
+                    ("SLURM_ARRAY_TASK_ID", "1"),
+                    ("SLURM_ARRAY_TASK_COUNT", "4"),
+                    ("OMPI_COMM_WORLD_RANK", "1"),
+                    ("OMPI_COMM_WORLD_SIZE", "2"),
+                ],
+                "1/2",
+            ),
+            (
+                &[
+                    ("SLURM_ARRAY_TASK_ID", "1"),
+                    ("SLURM_ARRAY_TASK_COUNT", "4"),
+                    ("OMPI_COMM_WORLD_RANK", "0"),
+                    ("OMPI_COMM_WORLD_SIZE", "1"),
+                ],
+                "1/4",
+            ),
         ] {
             assert_eq!(said(variables), expected, "{variables:?}");
         }
@@ -171,8 +251,19 @@ mod tests {
             (&[("PMI_RANK", "4"), ("PMI_SIZE", "4")], "there is no piece 4 of 4"),
             (&[("PMIX_RANK", "1")], "nothing says of how many"),
             (&[("SLURM_ARRAY_TASK_ID", "1")], "is not there to say of how many"),
-            (&[("SLURM_ARRAY_TASK_ID", "7"), ("SLURM_ARRAY_TASK_COUNT", "3"), ("SLURM_ARRAY_TASK_MIN", "1"), ("SLURM_ARRAY_TASK_MAX", "7")], "not evenly spaced"),
-            (&[("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_TASK_COUNT", "1"), ("SLURM_ARRAY_TASK_MIN", "3")], "a single task is submitted again"),
+            (
+                &[
+                    ("SLURM_ARRAY_TASK_ID", "7"),
+                    ("SLURM_ARRAY_TASK_COUNT", "3"),
+                    ("SLURM_ARRAY_TASK_MIN", "1"),
+                    ("SLURM_ARRAY_TASK_MAX", "7"),
+                ],
+                "not evenly spaced",
+            ),
+            (
+                &[("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_TASK_COUNT", "1"), ("SLURM_ARRAY_TASK_MIN", "3")],
+                "a single task is submitted again",
+            ),
         ] {
             assert!(said(variables).contains(expected), "{variables:?}: {}", said(variables));
             assert!(said(variables).ends_with(REMEDY), "{variables:?}");

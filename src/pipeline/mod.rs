@@ -38,10 +38,10 @@ use crate::stages::{Invalid, Piece, Plan, suggest};
 
 pub use document::Document;
 pub use error::{Error, Place, Refusal};
-pub use provenance::Told;
-pub use report::{FileReport, Report, StageTime};
 pub use launcher::Launched;
 pub use pieces::PiecesError;
+pub use provenance::Told;
+pub use report::{FileReport, Report, StageTime};
 pub use run::{RunError, merge, run};
 pub use schema::schema;
 pub use settings::{Backend, BackendError, Settings};

@@ -25,7 +25,10 @@ const NAMED: usize = 12;
 #[derive(Debug, thiserror::Error)]
 pub enum PiecesError {
     /// There are none.
-    #[error("there are no pieces in {}; make them by `ao4d run --piece K/N`, or name their folder's parent by --out", out)]
+    #[error(
+        "there are no pieces in {}; make them by `ao4d run --piece K/N`, or name their folder's parent by --out",
+        out
+    )]
     None {
         /// Where they would be.
         out: String,
@@ -39,7 +42,9 @@ pub enum PiecesError {
         counts: String,
     },
     /// Some aren't there, or not whole.
-    #[error("{which} of {count} {verb} missing or unfinished; make {them} by `ao4d run --piece K/{count}`, then merge again")]
+    #[error(
+        "{which} of {count} {verb} missing or unfinished; make {them} by `ao4d run --piece K/{count}`, then merge again"
+    )]
     Missing {
         /// The pieces.
         which: String,
@@ -118,7 +123,8 @@ pub(super) fn check(pipeline: &Pipeline, keys: &Keys, text: &str, joined: &Joine
         let folder = piece.folder(&plan.out);
         let cache = Cache::open(&folder, false);
         let outputs: Vec<_> = (0..plan.stages.len()).flat_map(|stage| plan.left_by(stage, keys, piece)).collect();
-        let files = || outputs.iter().flat_map(|o| std::iter::once(&o.file).chain(&o.beside).map(|file| (file, &o.key)));
+        let files =
+            || outputs.iter().flat_map(|o| std::iter::once(&o.file).chain(&o.beside).map(|file| (file, &o.key)));
         if files().all(|(file, key)| cache.is_fresh(file, key)) {
             continue;
         }
@@ -154,7 +160,9 @@ fn difference(told: &Told, text: &str) -> Option<String> {
             (None, None) => return (told.build != program()).then(build),
             (a, b) if a == b => {}
             (a, b) => {
-                let line = |line: Option<&str>| line.map_or("nothing".to_owned(), |l| format!("`{}`", shortened(l.trim(), 80)));
+                let line = |line: Option<&str>| {
+                    line.map_or("nothing".to_owned(), |l| format!("`{}`", shortened(l.trim(), 80)))
+                };
                 return Some(format!("its pipeline says {} where this one says {}", line(a), line(b)));
             }
         }
@@ -171,7 +179,8 @@ fn named(pieces: &[usize]) -> String {
         }
     }
     let more = ranges.len().saturating_sub(NAMED);
-    let range = |&(first, last): &(usize, usize)| if first == last { first.to_string() } else { format!("{first} to {last}") };
+    let range =
+        |&(first, last): &(usize, usize)| if first == last { first.to_string() } else { format!("{first} to {last}") };
     let mut text = ranges.iter().take(NAMED).map(range).collect::<Vec<_>>().join(", ");
     if more > 0 {
         text += &format!(" and {more} more");
@@ -193,8 +202,10 @@ mod tests {
 
     #[test]
     fn a_difference_is_told_by_its_line() {
-        let told = |name: &str, pipeline: &str| {
-            Told { program: name.to_owned(), build: program(), pipeline: pipeline.to_owned() }
+        let told = |name: &str, pipeline: &str| Told {
+            program: name.to_owned(),
+            build: program(),
+            pipeline: pipeline.to_owned(),
         };
         let other = Told { build: "other".to_owned(), ..told(PROGRAM, "") };
         assert!(difference(&other, "").unwrap().contains("another build"));

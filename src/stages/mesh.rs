@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use super::describe::{Counts, grouped};
 use super::occlusion::{self, OcclusionPlan};
+use super::piece::{self, Piece};
 use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
 use super::write::{Found, MeshPart, vtu};
-use super::piece::{self, Piece};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::io;
 

@@ -459,7 +459,8 @@ fn wants_all(me: Ref<OcclusionPlan>, plan: &Plan) -> bool {
 
 /// Whether some file wants directions at all vertices.
 fn wants_directions(me: Ref<OcclusionPlan>, plan: &Plan) -> bool {
-    let shown = |write: &WritePlan| plan[write.render].occlusion == Some(me) && write.has_mesh() && write.has_directions();
+    let shown =
+        |write: &WritePlan| plan[write.render].occlusion == Some(me) && write.has_mesh() && write.has_directions();
     plan.all::<WritePlan>().any(|(_, write)| shown(write))
 }
 

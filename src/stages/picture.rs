@@ -95,14 +95,15 @@ impl RenderPlan {
         let looked_at = part.as_ref().map_or(0..all, |slab| slab.looked_at(filters::reach(&picture.filters), all));
         let running = progress.stage(name, passes * (looked_at.len() * picture.grid.layer_len()) as u64);
         let first = layers.start;
-        let made = picture.render_layers(layers, Some(border), &aovs, None, progress, |slab| -> Result<(), StageError> {
-            // The layer that is the next part's too is counted there.
-            if slab.layers.start < border {
-                seen += slab.seen;
-                behind += slab.behind;
-            }
-            Ok(files.add_slab(slab.layers.start - first, &slab.arrays)?)
-        })?;
+        let made =
+            picture.render_layers(layers, Some(border), &aovs, None, progress, |slab| -> Result<(), StageError> {
+                // The layer that is the next part's too is counted there.
+                if slab.layers.start < border {
+                    seen += slab.seen;
+                    behind += slab.behind;
+                }
+                Ok(files.add_slab(slab.layers.start - first, &slab.arrays)?)
+            })?;
         let mut accuracy = None;
         let mut checked = Vec::new();
         match (made.audit, &part) {

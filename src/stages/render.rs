@@ -421,7 +421,8 @@ impl Stage for RenderPlan {
         for (file, bytes) in made.files {
             if let Some(record) = &made.record {
                 // Of the files of a picture only `.vti` tell how far off it is.
-                let checked = if file.extension().is_some_and(|e| e == "vti") { record.checked.clone() } else { Vec::new() };
+                let checked =
+                    if file.extension().is_some_and(|e| e == "vti") { record.checked.clone() } else { Vec::new() };
                 let (path, record) = (piece::record_of(&file), Record { checked, ..record.clone() });
                 let bytes = write_whole(&plan.out.join(&path), record.to_json().as_bytes())?;
                 run.made_beside(&path, bytes)?;

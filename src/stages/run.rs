@@ -8,8 +8,8 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::occlusion::OcclusionPlan;
-use super::prepare::Loaded;
 use super::piece::Joined;
+use super::prepare::Loaded;
 use super::{Plan, Ref, StageError};
 use crate::io;
 use crate::occlusion::{Directional, Estimates};

@@ -15,8 +15,8 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec};
 use super::describe::{Counts, grouped};
-use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
 use super::piece::Piece;
+use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
 use super::write::{Encoding, PROGRAM, vti as picture};
 use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, Stage, StageError};
 use crate::geometry::{Dimension, Vector};

@@ -52,7 +52,9 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
                 true if name.starts_with("pieces-") => {}
                 true => open.push(path),
                 false if name == ".ao4d-cache.json" => {}
-                false => drop(found.insert(path.strip_prefix(folder).unwrap().to_owned(), std::fs::read(path).unwrap())),
+                false => {
+                    drop(found.insert(path.strip_prefix(folder).unwrap().to_owned(), std::fs::read(path).unwrap()))
+                }
             }
         }
     }

@@ -56,7 +56,8 @@ impl<'f, const D: usize> Chain<'f, D> {
         for (stage, filter) in filters.iter().enumerate().rev() {
             made[stage] = made[stage + 1].saturating_sub(filter.halo());
         }
-        let windows = made[..filters.len()].iter().map(|&first| GBuffer::new(dimensions, first..first, columns)).collect();
+        let windows =
+            made[..filters.len()].iter().map(|&first| GBuffer::new(dimensions, first..first, columns)).collect();
         Self { dimensions, filters, windows, made }
     }
 
@@ -165,7 +166,11 @@ mod tests {
             assert_eq!(image(0..11, thickness), whole, "{thickness}");
             for first in 0..11 {
                 for end in first + 1..12 {
-                    assert_eq!(image(first..end, thickness), whole[2 * first..2 * end], "{first}..{end} by {thickness}");
+                    assert_eq!(
+                        image(first..end, thickness),
+                        whole[2 * first..2 * end],
+                        "{first}..{end} by {thickness}"
+                    );
                 }
             }
         }

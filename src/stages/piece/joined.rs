@@ -56,7 +56,11 @@ impl Joined {
             let path = self.path(piece, &super::values_of(occlusion));
             let part = Values::read(&path)?;
             if part.range() != piece.share(vertices) {
-                let cause = std::io::Error::other(format!("it has the vertices {:?}, not {:?}", part.range(), piece.share(vertices)));
+                let cause = std::io::Error::other(format!(
+                    "it has the vertices {:?}, not {:?}",
+                    part.range(),
+                    piece.share(vertices)
+                ));
                 return Err(Error::File { path, action: "be used", cause });
             }
             all.rays += part.rays;

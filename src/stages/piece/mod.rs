@@ -194,7 +194,21 @@ mod tests {
     #[test]
     fn pieces_are_written_k_of_n() {
         assert_eq!("2/4".parse(), Piece::new(2, 4));
-        for text in ["", "1", "1/", "/2", "a/b", "1/2/3", "-1/2", "+1/2", "1 /2", "4/4", "0/0", "0/1000001", "0/99999999999999999999"] {
+        for text in [
+            "",
+            "1",
+            "1/",
+            "/2",
+            "a/b",
+            "1/2/3",
+            "-1/2",
+            "+1/2",
+            "1 /2",
+            "4/4",
+            "0/0",
+            "0/1000001",
+            "0/99999999999999999999",
+        ] {
             assert!(text.parse::<Piece>().is_err(), "{text}");
         }
         assert!("4/4".parse::<Piece>().unwrap_err().contains("the last is 3/4"));
@@ -219,7 +233,10 @@ mod tests {
         for (count, layers, picture) in [(4, 17, 0), (4, 4, 3), (16, 5, 2), (3, 1, 1), (1, 9, 5)] {
             let parts = Piece::of_picture(count, layers, picture);
             assert_eq!(parts.len(), count.min(layers));
-            assert_eq!(parts.iter().flat_map(|(_, slab)| slab.own.clone()).collect::<Vec<_>>(), (0..layers).collect::<Vec<_>>());
+            assert_eq!(
+                parts.iter().flat_map(|(_, slab)| slab.own.clone()).collect::<Vec<_>>(),
+                (0..layers).collect::<Vec<_>>()
+            );
             for pair in parts.windows(2) {
                 assert_eq!(pair[0].1.end, pair[1].1.own.start + 1);
             }

@@ -80,7 +80,8 @@ mod tests {
 
     #[test]
     fn they_come_back_or_are_refused() {
-        let values = Values { first: 7, values: vec![0.5, 1.0], errors: vec![0.0, f32::NAN], rays: 512, vectors: vec![1.0; 8] };
+        let values =
+            Values { first: 7, values: vec![0.5, 1.0], errors: vec![0.0, f32::NAN], rays: 512, vectors: vec![1.0; 8] };
         let bytes = values.to_bytes();
         let again = Values::parse(&bytes).unwrap();
         assert_eq!((again.range(), again.rays, again.vectors.len()), (7..9, 512, 8));

@@ -55,7 +55,8 @@ pub(in crate::stages) fn join<const D: usize>(
                 }
                 let voxels = grid.layer_len() * slab.layers().len();
                 let arrays = file.format.read_part(&part, write, image, voxels)?;
-                let own: Vec<Array> = arrays.into_iter().map(|array| first_voxels(array, grid, slab.own.len())).collect();
+                let own: Vec<Array> =
+                    arrays.into_iter().map(|array| first_voxels(array, grid, slab.own.len())).collect();
                 open.add_slab(slab.own.start, &own.iter().collect::<Vec<_>>())?;
                 run.progress.advance(slab.own.len() as u64);
             }

@@ -117,8 +117,10 @@ fn colours() -> Vec<ArraySpec> {
 
 /// Reads just these arrays of so many voxels.
 fn read_arrays(path: &Path, specs: &[ArraySpec], voxels: usize) -> Result<Vec<Array>, Error> {
-    let failed = |cause: String| {
-        Error::File { path: path.to_owned(), action: "be used as a part", cause: std::io::Error::other(cause) }
+    let failed = |cause: String| Error::File {
+        path: path.to_owned(),
+        action: "be used as a part",
+        cause: std::io::Error::other(cause),
     };
     let mut found = vtk::read_volume(path).map_err(|error| failed(error.to_string()))?.arrays;
     let array = |spec: &ArraySpec| {

@@ -17,7 +17,7 @@ stages:
       id: s
       objects:
         - {name: body, tesseract: {size: 0.6}, color: [0.9, 0.4, 0.2], transform: [{rotate: {plane: xw, degrees: 20}}]}
-        - {name: other, cross_polytope: {radius: 0.4}, transform: [{translate: [0.5, 0.2, 0.1, 0.3]}]}
+        - {name: other, box: {min: [-0.2, -0.3, -0.2, -0.1], max: [0.2, 0.3, 0.2, 0.2]}, transform: [{translate: [0.5, 0.2, 0.1, 0.3]}]}
   - occlusion: {id: ao, samples: 8}
   - render: {id: plain, occlusion: none, dimensions: [5, 6, 7], supersample: 1}
   - write: {vti: plain.vti, encoding: inline}
@@ -141,7 +141,11 @@ fn a_piece_that_died_is_named_and_made_again_alone() {
     std::fs::remove_dir_all(folder.path("out/pieces-4/3")).unwrap();
     refused(&folder, "merge", &["--out", "out"], &["pieces 2 to 3 of 4 are missing or unfinished"]);
     let (first, _) = report(&folder, "run", &["--out", "out", "--piece", "0/4"]);
-    assert_eq!((&first["work"]["vertices"], &first["piece"]), (&0.into(), &"0/4".into()), "what is there is not made again");
+    assert_eq!(
+        (&first["work"]["vertices"], &first["piece"]),
+        (&0.into(), &"0/4".into()),
+        "what is there is not made again"
+    );
     report(&folder, "run", &["--out", "out", "--piece", "2/4"]);
     report(&folder, "run", &["--out", "out", "--piece", "3/4"]);
     report(&folder, "merge", &["--out", "out"]);
@@ -197,14 +201,22 @@ fn launchers_say_which_piece() {
         let report: Value = serde_json::from_slice(&output.stdout).unwrap();
         (report["piece"].as_str().map(str::to_owned), told)
     };
-    let array = [("SLURM_ARRAY_TASK_ID", "6"), ("SLURM_ARRAY_TASK_COUNT", "3"), ("SLURM_ARRAY_TASK_STEP", "2"), ("SLURM_ARRAY_TASK_MIN", "4")];
+    let array = [
+        ("SLURM_ARRAY_TASK_ID", "6"),
+        ("SLURM_ARRAY_TASK_COUNT", "3"),
+        ("SLURM_ARRAY_TASK_STEP", "2"),
+        ("SLURM_ARRAY_TASK_MIN", "4"),
+    ];
     let (piece, told) = run(&[], &array);
     assert_eq!(piece.as_deref(), Some("1/3"));
     assert!(told.contains("note: piece 1/3, by SLURM_ARRAY_TASK_ID"), "{told}");
     let mpi = [("OMPI_COMM_WORLD_RANK", "2"), ("OMPI_COMM_WORLD_SIZE", "4")];
     assert_eq!(run(&[], &mpi).0.as_deref(), Some("2/4"));
     assert_eq!(run(&["--piece", "0/2"], &mpi).0.as_deref(), Some("0/2"), "what is written counts");
-    for whole in [run(&["--piece", "none"], &mpi), run(&[], &[("SLURM_JOB_ID", "1"), ("SLURM_PROCID", "0"), ("SLURM_NTASKS", "1")])] {
+    for whole in [
+        run(&["--piece", "none"], &mpi),
+        run(&[], &[("SLURM_JOB_ID", "1"), ("SLURM_PROCID", "0"), ("SLURM_NTASKS", "1")]),
+    ] {
         assert_eq!(whole.0, None);
         assert!(!whole.1.contains("piece"), "{}", whole.1);
     }
@@ -214,7 +226,8 @@ fn launchers_say_which_piece() {
 fn one_piece_is_made_once_at_a_time_and_different_ones_together() {
     let folder = Folder::new();
     let start = |piece: &str| {
-        let mut command = folder.command(&["--piece", piece, "--set", "ao.samples=16384", "--set", "image.dimensions=[60, 60, 60]"]);
+        let mut command =
+            folder.command(&["--piece", piece, "--set", "ao.samples=16384", "--set", "image.dimensions=[60, 60, 60]"]);
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     };
     let (mut first, mut second) = (start("0/2"), start("1/2"));
