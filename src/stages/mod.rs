@@ -36,6 +36,7 @@ pub mod paraview;
 mod picture;
 mod plan;
 pub mod prepare;
+pub mod projection;
 mod range;
 mod rays;
 pub mod render;
