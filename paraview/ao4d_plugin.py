@@ -4,9 +4,9 @@ Tools > Manage Plugins > Load New > this file (tick Auto Load to keep it). It ne
 looks for in the property Program, in the environment variable AO4D, in PATH, and where cargo and pip put it. Then
 
 - File > Open a pipeline (.yaml): its picture, with the properties that one turns: method, samples, voxels, tolerance, the 4D camera;
-- Sources > ao4d slice: the exact cross-section of a pipeline's scene at some w;
-- Sources > ao4d film: a pipeline's `animate` stage, or a turn of its camera, frame by frame for ParaView's Play button;
-- Filters > ao4d occlusion: ambient occlusion on what is in ParaView already. Of a grid of tetrahedra with four coordinates (a point
+- Sources > ao4d Slice: the exact cross-section of a pipeline's scene at some w;
+- Sources > ao4d Film: a pipeline's `animate` stage, or a turn of its camera, frame by frame for ParaView's Play button;
+- Filters > ao4d Occlusion: ambient occlusion on what is in ParaView already. Of a grid of tetrahedra with four coordinates (a point
   array of four components, or a fourth coordinate beside the points) in 4D; of a series of images over time on the isosurface in
   space and time; of anything else in 3D on its outer surface.
 
@@ -280,7 +280,7 @@ class Base(VTKPythonAlgorithmBase):
     def setup(self):
         self._values = {}
         self._folder = tempfile.mkdtemp(prefix="ao4d-")
-        self._plans, self._made, self._what = {}, None, None
+        self._plans, self._made, self._what, self._said = {}, None, None, None
 
     def __del__(self):
         shutil.rmtree(getattr(self, "_folder", ""), ignore_errors=True)
@@ -289,6 +289,7 @@ class Base(VTKPythonAlgorithmBase):
         value = "" if value in (None, "None") else value
         if self._values.get(name) != value:
             self._values[name] = value
+            self._said = None
             self.Modified()
 
     def get(self, name, default=None):
@@ -300,16 +301,20 @@ class Base(VTKPythonAlgorithmBase):
         return bool(abort and abort())
 
     def guarded(self, work):
-        """Does the work; tells what is wrong as ParaView tells errors."""
+        """Does the work; tells what is wrong, once, as ParaView tells errors. There is no output then, and no traceback."""
         try:
-            return work()
+            work()
+            return 1
         except Cancelled:
-            tell("ao4d: cancelled")
+            message, is_error = "ao4d: cancelled; change something, and Apply, to go on", False
         except Refused as refusal:
-            tell(str(refusal), is_error=True)
+            message, is_error = str(refusal), True
         except OSError as error:
-            tell("ao4d: %s" % error, is_error=True)
-        return None
+            message, is_error = "ao4d: %s" % error, True
+        if message != self._said:
+            self._said = message
+            tell(message, is_error)
+        return 1
 
     def file(self):
         file = self.get("FileName")
@@ -428,9 +433,9 @@ VOXELS = number("Voxels", "Voxels", "Along the longest axis; 0: as in the file."
 TOLERANCE = number("Tolerance", "Tolerance", "The error that a voxel may have; 0: as in the file.", 0, 0, 0.1)
 SUPERSAMPLE = number("Supersample", "Supersample", "Samples a voxel along each axis; 0: as in the file.", 0, 0, 5, "Int")
 CAMERA = (
-    number("TurnXW", "Turn xw", "Degrees by which the eye turns about its target from right towards the line of sight.", 0, -180, 180)
-    + number("TurnYW", "Turn yw", "The same from up.", 0, -180, 180)
-    + number("TurnZW", "Turn zw", "The same from over; of no use in 3D.", 0, -180, 180)
+    number("TurnXW", "Turn XW", "Degrees by which the eye turns about its target from right towards the line of sight.", 0, -180, 180)
+    + number("TurnYW", "Turn YW", "The same from up.", 0, -180, 180)
+    + number("TurnZW", "Turn ZW", "The same from over; of no use in 3D.", 0, -180, 180)
     + number("Distance", "Distance", "How many times as far as in the file the eye is from its target.", 1, 0.1, 10)
 )
 
@@ -450,7 +455,7 @@ def setters(*names):
 
 
 @smproxy.reader(
-    name="ao4dPicture", label="ao4d picture", extensions="yaml yml", file_description="ao4d pipelines", support_reload=False
+    name="ao4dPicture", label="ao4d Picture", extensions="yaml yml", file_description="ao4d pipelines", support_reload=False
 )
 @smproperty.xml(FILE + PICTURE + METHOD + SAMPLES + VOXELS + TOLERANCE + SUPERSAMPLE + CAMERA + SET + PROGRAM)
 @smhint.xml(VOLUME)
@@ -501,9 +506,8 @@ class Ao4dPicture(Base):
             _, dimensions, _ = self.render(self.plan())
             extent = [bound for n in (dimensions + [1])[:3] for bound in (0, n - 1)]
             outputs.GetInformationObject(0).Set(keys.WHOLE_EXTENT(), extent, 6)
-            return 1
 
-        return self.guarded(work) or 0
+        return self.guarded(work)
 
     def RequestData(self, request, inputs, outputs):
         def work():
@@ -511,15 +515,14 @@ class Ao4dPicture(Base):
             image = self.read("picture.vti", image_reader)
             image.GetPointData().SetActiveScalars("rgba")
             vtkImageData.GetData(outputs, 0).ShallowCopy(image)
-            return 1
 
-        return self.guarded(work) or 0
+        return self.guarded(work)
 
 
-@smproxy.source(name="ao4dSlice", label="ao4d slice", support_reload=False)
+@smproxy.source(name="ao4dSlice", label="ao4d Slice", support_reload=False)
 @smproperty.xml(
     FILE
-    + number("W", "w", "Where the slice is along the scene's last axis.", 0, -2, 2)
+    + number("W", "W", "Where the slice is along the scene's last axis.", 0, -2, 2)
     + METHOD
     + SAMPLES
     + SET
@@ -544,12 +547,11 @@ class Ao4dSlice(Base):
             slice = self.read("slice.vtp", poly_reader)
             slice.GetPointData().SetActiveScalars("ambient_occlusion")
             vtkPolyData.GetData(outputs, 0).ShallowCopy(slice)
-            return 1
 
-        return self.guarded(work) or 0
+        return self.guarded(work)
 
 
-@smproxy.source(name="ao4dFilm", label="ao4d film", support_reload=False)
+@smproxy.source(name="ao4dFilm", label="ao4d Film", support_reload=False)
 @smproperty.xml(
     TIMES
     + FILE
@@ -592,9 +594,8 @@ class Ao4dFilm(Base):
             information.Set(keys.WHOLE_EXTENT(), extent, 6)
             information.Set(keys.TIME_STEPS(), times, len(times))
             information.Set(keys.TIME_RANGE(), [times[0], times[-1]], 2)
-            return 1
 
-        return self.guarded(work) or 0
+        return self.guarded(work)
 
     def RequestData(self, request, inputs, outputs):
         def work():
@@ -624,15 +625,14 @@ class Ao4dFilm(Base):
             output = vtkImageData.GetData(outputs, 0)
             output.ShallowCopy(image)
             output.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), frame / rate)
-            return 1
 
-        return self.guarded(work) or 0
+        return self.guarded(work)
 
 
 # ----------------------------------------------------------------------------------------------------------------- the filter
 
 
-@smproxy.filter(name="ao4dOcclusion", label="ao4d occlusion", support_reload=False)
+@smproxy.filter(name="ao4dOcclusion", label="ao4d Occlusion", support_reload=False)
 @smproperty.xml(
     choice("Method", "Method", "How ambient occlusion is computed.", ["sobol"] + METHODS[2:])
     + number("Samples", "Samples", "Rays a vertex.", 256, 1, 4096, "Int")
@@ -684,7 +684,7 @@ class Ao4dOcclusion(Base):
                 self._steps.append(step)
                 if len(self._steps) < len(self._times):
                     request.Set(keys.CONTINUE_EXECUTING(), 1)
-                    return 1
+                    return
                 request.Remove(keys.CONTINUE_EXECUTING())
                 scene = self.images(self._steps, self._times)
                 self._steps, source = [], None
@@ -704,13 +704,13 @@ class Ao4dOcclusion(Base):
                 hand_on(source, mesh)
             mesh.GetPointData().SetActiveScalars("ambient_occlusion")
             vtkUnstructuredGrid.GetData(outputs, 0).ShallowCopy(mesh)
-            return 1
 
-        done = self.guarded(work)
-        if not done:
+        steps = len(self._steps)
+        self.guarded(work)
+        if len(self._steps) <= steps:  # all are there, or something is wrong
             self._steps = []
             request.Remove(keys.CONTINUE_EXECUTING())
-        return done or 0
+        return 1
 
     def object(self, shape):
         angle = self.get("CreaseAngle", 30.0)

@@ -163,6 +163,8 @@ class Occlusion:
     errors: np.ndarray
     #: Rays in all.
     rays: int = 0
+    #: How it was computed; pictures trace rays of their own by it.
+    keys: dict = field(default_factory=dict)
 
     @property
     def error(self) -> float:
@@ -302,8 +304,10 @@ def occlusion(mesh: Mesh, *, threads: Optional[int] = None, progress: Progress =
     Keys are those of a pipeline's `occlusion`: method="sobol" (or "random", "adaptive", "exact", ...), samples=256, or
     target_error=0.005 with max_samples; max_distance; seed.
     """
+    # A file that nobody writes: an occlusion without one, and without a picture, would be warned of.
+    text = _stages(mesh, {"occlusion": {"file": "values.f32", **keys}})
     with _watching(progress) as watch:
-        return Occlusion(*_native.occlusion(mesh._native, _stages(mesh, {"occlusion": keys}), threads, watch))
+        return Occlusion(*_native.occlusion(mesh._native, text, threads, watch), keys)
 
 
 def render(
@@ -321,7 +325,7 @@ def render(
     `render`: dimensions=[64, 64, 64], camera={"eye": ..., "target": ..., "field_of_view": ...}, shading="auto",
     tolerance=0.01, supersample, dilate, lights, sky, ...
     """
-    settings = {} if occlusion is None or isinstance(occlusion, Occlusion) else occlusion
+    settings = occlusion.keys if isinstance(occlusion, Occlusion) else occlusion or {}
     before = [] if occlusion is False else [{"occlusion": settings}]
     if occlusion is False:
         keys = {"occlusion": "none", **keys}

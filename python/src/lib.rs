@@ -18,7 +18,7 @@ use ao4d::occlusion::Estimates;
 use ao4d::pipeline::{Document, Pipeline, RunError, Settings};
 use ao4d::stages::{StageError, memory};
 use ao4d::volume::{Grid, Volume};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyAny;

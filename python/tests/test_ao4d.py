@@ -15,9 +15,9 @@ import numpy as np
 
 import ao4d
 
-# A tetrahedron in 4D, and one in front of it in w.
+# A tetrahedron in 4D, and one behind it in w, a little aside.
 FRONT = np.array([[-0.6, -0.6, -0.6, -0.2], [0.6, -0.6, -0.6, -0.2], [0, 0.6, -0.6, -0.2], [0, 0, 0.6, -0.2]])
-BACK = FRONT * [2.3, 2.3, 2.3, 2.5]
+BACK = FRONT + [0.3, 0.2, 0.1, -0.1]
 CELL = np.array([[0, 1, 2, 3]])
 EYE = [0, 0, 0, 1]
 
@@ -62,13 +62,13 @@ def test_occlusion_of_known_scenes():
     exact = ao4d.occlusion(two(), method="exact")
     rays = ao4d.occlusion(two(), samples=4096)
     assert exact.rays == 0 and rays.rays == 8 * 4096 and exact.error == 0 < rays.error < 0.01
-    assert exact.values.dtype == np.float32 and exact.values.min() < 0.9
+    assert exact.values.dtype == np.float32 and exact.values.min() < 0.5
     assert np.all(np.abs(exact.values - rays.values) < 0.02)
-    # In 3D a floor beside an endless wall has half of its sky: nearly so for a wide wall.
+    # In 3D a floor near an endless wall has half of its sky: nearly so for a large one.
     floor = ao4d.Object([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     wall = ao4d.Object([[0, -1e4, 0], [0, 1e4, 0], [0, 0, 1e5]], [[0, 1, 2]])
     found = ao4d.occlusion(ao4d.Mesh.of([floor, wall]), method="exact")
-    assert abs(found.values[0] - 0.5) < 0.01, found.values
+    assert abs(found.values[1] - 0.5) < 0.01, found.values
 
 
 def test_the_same_for_any_number_of_threads():
@@ -83,7 +83,7 @@ def test_pictures():
     assert picture.dimensions == (12, 10, 8) and picture["rgba"].shape == (8, 10, 12, 4)
     assert picture["rgba"].dtype == np.uint8 and picture["opacity"].dtype == np.float32
     assert np.shares_memory(picture["rgba"], picture.arrays["rgba"]), "a view"
-    assert 0 < picture["opacity"].mean() < 1 and picture["ambient_occlusion"].min() < 0.9
+    assert 0 < picture["opacity"].mean() < 1 and picture["ambient_occlusion"].min() < 0.95
     assert picture.accuracy[0] < 0.05
     # The picture lies around the middle of the image, x fastest.
     assert np.allclose(np.array(picture.origin) + (np.array(picture.dimensions) - 1) / 2 * picture.spacing, 0, atol=1e-12)
@@ -126,7 +126,7 @@ def test_runs():
         file = Path(folder) / "p.yaml"
         file.write_text(PIPELINE)
         assert ao4d.check(file)["totals"]["voxels"] == 512
-        assert ao4d.check(json.loads(json.dumps({"name": "d", "stages": [{"scene": {"objects": []}}]})))["name"] == "d"
+        assert ao4d.check(json.loads(json.dumps({"name": "d", "stages": [{"scene": {"objects": [{"tesseract": {}}]}}]})))["name"] == "d"
     assert "stages" in ao4d.schema()["properties"]
 
 
@@ -174,7 +174,7 @@ def test_light_passes_objects():
     opaque = ao4d.occlusion(two(), samples=256).values
     values = ao4d.occlusion(mesh, samples=256).values
     assert np.all(values >= opaque - 1e-6) and values.sum() > opaque.sum()
-    assert "let light through" in refusal(RuntimeError, lambda: ao4d.occlusion(mesh, method="exact"))
+    assert "knows opaque objects only" in refusal(ValueError, lambda: ao4d.occlusion(mesh, method="exact"))
     picture = ao4d.render(mesh, {"samples": 64}, dimensions=[9, 9, 9])
     assert picture["opacity"].max() > 0
 

@@ -1,9 +1,13 @@
 """Walks through ParaView's plugin as a user would; prints what came out as JSON. Run by pvbatch: PLUGIN FOLDER."""
 
+import inspect
 import json
 import os
 import sys
 import time
+
+if not hasattr(inspect, "getargspec"):
+    inspect.getargspec = inspect.getfullargspec
 
 from paraview.simple import *
 from vtkmodules.numpy_interface import dataset_adapter as dsa
@@ -31,10 +35,11 @@ def arrays(proxy):
     return {name: [float(x) for x in data[name].reshape(-1)[:: max(1, data[name].size // 1000)]] for name in data.keys()}
 
 
-def told():
+def told(read=[0]):
+    """What was said since it was asked last."""
     text = open(log).read() if os.path.exists(log) else ""
-    open(log, "w").close()
-    return text
+    new, read[0] = text[read[0] :], len(text)
+    return new
 
 
 picture = ao4dPicture(FileName=pipeline)
