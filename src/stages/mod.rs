@@ -28,6 +28,7 @@ pub mod describe;
 mod error;
 pub mod key;
 pub mod lighting;
+pub mod memory;
 pub mod mesh;
 mod names;
 pub mod occlusion;
