@@ -39,7 +39,7 @@ pub use layers::{LayerPoint, Layers, MOST as MOST_LAYERS};
 pub use light::{DepthCue, Light, Lighting, Source};
 pub use renderer::{Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
-pub use screen_space::{DepthImage, ScreenSpace, Thickness};
+pub use screen_space::{DepthImage, ScreenSpace, Seen, Thickness};
 pub use shading::Shading;
 pub use skylight::{Skylight, radiosity, relight};
 pub use visibility::{NOTHING, Passages, Visibility};

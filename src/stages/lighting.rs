@@ -339,7 +339,7 @@ pub(super) struct LightFound {
 impl LightFound {
     pub fn new<const D: usize>(light: &Skylight<D>, session: &Session<D>) -> Self {
         let (hits, behind) = light.seen();
-        Self { hits, behind, beside_opencl: session.is_on_opencl() }
+        Self { hits, behind, beside_opencl: session.is_on_opencl() && light.in_image.is_none() }
     }
 
     /// What to tell of it; `rays` says how many meet surfaces from behind.

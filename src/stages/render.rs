@@ -182,7 +182,7 @@ impl RenderPlan {
 
     /// Why nothing is known of the directions in which the sky is open, if so.
     pub(super) fn no_directions(&self, plan: &Plan) -> Option<String> {
-        no_directions(plan, self.scene, self.occlusion, self.screen_space.is_some())
+        no_directions(plan, self.scene, self.occlusion)
     }
 
     /// The number of voxels.
@@ -273,8 +273,9 @@ impl Stage for RenderPlan {
         let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
         for (key, given) in [("sky", spec.sky.is_some()), ("bounce", lighting.as_ref().is_some_and(|l| l.bounce))] {
             let needed = "needs an occlusion, which tells how much light reaches a surface";
-            let lacks = || (key == "bounce" && occlusion.is_none()).then(|| needed.to_owned());
-            let refusal = no_directions(&resolver.plan, scene, occlusion, screen_space.is_some()).or_else(lacks);
+            let is_dark = occlusion.is_some() || screen_space.is_some();
+            let lacks = || (key == "bounce" && !is_dark).then(|| needed.to_owned());
+            let refusal = no_directions(&resolver.plan, scene, occlusion).or_else(lacks);
             if let Some(message) = refusal.filter(|_| given) {
                 return Err(Invalid::new(format!("{path}.{key}"), message));
             }
@@ -428,13 +429,7 @@ fn no_directions(
     plan: &Plan,
     scene: Ref<ScenePlan>,
     occlusion: Option<Ref<OcclusionPlan>>,
-    in_screen_space: bool,
 ) -> Option<String> {
-    if in_screen_space {
-        let message = "`screen_space` tells how much of the sky is hidden, not where it is open; take the occlusion of an \
-                       `occlusion` stage";
-        return Some(message.to_owned());
-    }
     if let Some(name) = plan[scene].translucent() {
         return Some(format!(
             "{name} lets light through, and where the sky is open is found among opaque objects only; leave out `opacity` \

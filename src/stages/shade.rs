@@ -296,7 +296,7 @@ impl ShadePlan {
                 let n = row * width + i;
                 if depth_image.shows(n) {
                     let normal = Vector::<D>::from_fn(|r, _| normals.get(D * n + r) as f32);
-                    *found = Some(depth_image.occlusion_at(&normal, grid.index(n)));
+                    *found = Some(depth_image.seen_at(&normal, grid.index(n)).map(|seen| seen.open));
                 }
             }
             progress.advance(width as u64);

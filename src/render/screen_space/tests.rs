@@ -40,6 +40,12 @@ fn image<const D: usize>(
     DepthImage::new(&camera, &grid, (0..grid.len()).map(distance).collect(), settings)
 }
 
+impl<const D: usize> DepthImage<D> {
+    fn occlusion_at(&self, normal: &Vector<D>, index: [usize; 3]) -> Option<f32> {
+        self.seen_at(normal, index).map(|seen| seen.open)
+    }
+}
+
 /// The normal of a surface that steps back by so much for each unit to the right and up.
 fn normal<const D: usize>(right: f32, up: f32) -> Vector<D> {
     Vector::from_fn(|r, _| match r {
