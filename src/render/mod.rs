@@ -36,7 +36,7 @@ pub use audit::Accuracy;
 pub use camera::{Camera, CameraError, Projection, View};
 pub use gbuffer::{Columns, GBuffer};
 pub use layers::{LayerPoint, Layers, MOST as MOST_LAYERS};
-pub use light::{DepthCue, Light, Lighting, Source};
+pub use light::{DepthCue, Light, Lighting, Source, reflectance};
 pub use renderer::{Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
 pub use screen_space::{DepthImage, ScreenSpace, Seen, Thickness};
