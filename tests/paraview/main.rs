@@ -8,4 +8,5 @@ mod paraview_run;
 mod paraview_state;
 mod pieces;
 mod pipelines;
+mod plugin;
 mod vtk_files;
