@@ -220,8 +220,8 @@ mod tests {
             for things in [0, 1, 5, 64, 100, 12_345] {
                 let all: Vec<usize> = Piece::all(count).flat_map(|piece| piece.share(things)).collect();
                 assert_eq!(all, (0..things).collect::<Vec<_>>());
-                let lengths = Piece::all(count).map(|piece| piece.share(things).len());
-                let (least, most) = (lengths.clone().min().unwrap(), lengths.max().unwrap());
+                let lengths: Vec<usize> = Piece::all(count).map(|piece| piece.share(things).len()).collect();
+                let (least, most) = (lengths.iter().min().unwrap(), lengths.iter().max().unwrap());
                 assert!(most - least <= 1);
             }
         }
