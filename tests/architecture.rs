@@ -80,6 +80,7 @@ const KNOWN_CIRCLES: &[&[&str]] = &[
         "stages/subject.rs",
         "stages/write/mod.rs",
         "stages/write/files.rs",
+        "stages/write/join.rs",
     ],
 ];
 
