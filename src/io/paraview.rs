@@ -233,7 +233,10 @@ fn constant(figure: &Figure, name: &str) -> String {
                 Hidden::Same => "'same'",
             };
             let radius = tubes.radius.map_or("None".into(), number);
-            format!("{{'color_by': {color_by}, 'hidden': {hidden}, 'radius': {radius}, 'skin': {}}}", number(tubes.skin))
+            format!(
+                "{{'color_by': {color_by}, 'hidden': {hidden}, 'radius': {radius}, 'skin': {}}}",
+                number(tubes.skin)
+            )
         }),
         "SIZE" => figure.size.map_or("None".into(), |[width, height]| format!("[{width}, {height}]")),
         other => format!("@{other}@"),
@@ -261,8 +264,7 @@ fn panels(panels: &[Panel]) -> String {
         }
         if let Some(grid) = grid {
             let (dimensions, origin, spacing) = (grid.dimensions, numbers(&grid.origin), numbers(&grid.spacing));
-            let _ =
-                write!(text, ",\n     'dimensions': {dimensions:?}, 'origin': {origin}, 'spacing': {spacing}");
+            let _ = write!(text, ",\n     'dimensions': {dimensions:?}, 'origin': {origin}, 'spacing': {spacing}");
         }
         text.push_str("},\n");
     }
@@ -382,7 +384,9 @@ mod tests {
         let text = state(&figure);
         assert!(text.contains("{'file': 'with.vti', 'caption': 'with', 'edges': 'e.vtp',\n     'dimensions'"));
         assert!(text.contains("    {'kind': 'edges', 'file': 'e.vtp', 'caption': ''},\n"));
-        assert!(text.contains("    {'kind': 'slices', 'file': 'a.vtp', 'files': ['a.vtp', 'b.vtp'], 'caption': ''},\n"));
+        assert!(
+            text.contains("    {'kind': 'slices', 'file': 'a.vtp', 'files': ['a.vtp', 'b.vtp'], 'caption': ''},\n")
+        );
         let tubes = "TUBES = {'color_by': 'w', 'hidden': 'leave_out', 'radius': None, 'skin': 0.5}";
         assert_eq!(line(&text, "TUBES"), tubes);
 

@@ -35,12 +35,7 @@ impl Hopf {
         };
         // Exactly zero for Clifford's torus.
         let c = if degrees == 45.0 { 0.0 } else { libm::cos(2.0 * degrees.to_radians()) };
-        let form = [
-            [c - r, 0.0, -p, q],
-            [0.0, c - r, -q, -p],
-            [-p, -q, c + r, 0.0],
-            [q, -p, 0.0, c + r],
-        ];
+        let form = [[c - r, 0.0, -p, q], [0.0, c - r, -q, -p], [-p, -q, c + r, 0.0], [q, -p, 0.0, c + r]];
         Some(Self { center, form })
     }
 
@@ -48,7 +43,6 @@ impl Hopf {
     fn product(&self, a: &Vector64<4>, b: &Vector64<4>) -> f64 {
         (0..4).map(|i| (0..4).map(|j| a[i] * self.form[i][j] * b[j]).sum::<f64>()).sum()
     }
-
 }
 
 impl<const D: usize> Level<D> for Hopf {

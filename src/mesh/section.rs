@@ -183,11 +183,7 @@ struct Cut<'a, const D: usize, L: ?Sized> {
 
 /// Cuts a mesh. Its objects stay apart, and points that are the same for geometry are two where the vertices' `values`, if
 /// there are any, tell them apart: the sides of a crease.
-pub fn section<const D: usize>(
-    mesh: &Mesh<D>,
-    level: &(impl Level<D> + ?Sized),
-    values: Option<&[f32]>,
-) -> Section {
+pub fn section<const D: usize>(mesh: &Mesh<D>, level: &(impl Level<D> + ?Sized), values: Option<&[f32]>) -> Section {
     let heights = mesh.vertices.par_iter().map(|point| level.height(point)).collect();
     let same = same_points(mesh, values);
     let mut cut = Cut { mesh, level, heights, same, numbers: HashMap::new(), made: Section::default() };

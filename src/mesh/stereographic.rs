@@ -183,8 +183,9 @@ mod tests {
         let [a, b, c] = [0, points.len() / 2, points.len() - 1].map(|i| points[i]);
         let (u, v) = (b - a, c - a);
         let normal = u.cross(&v);
-        let center = a + (u.norm_squared() * v.cross(&normal) + v.norm_squared() * normal.cross(&u))
-            / (2.0 * normal.norm_squared());
+        let center = a
+            + (u.norm_squared() * v.cross(&normal) + v.norm_squared() * normal.cross(&u))
+                / (2.0 * normal.norm_squared());
         let radius = (a - center).norm();
         for p in &points {
             assert!(((p - center).norm() - radius).abs() < 1e-9 * radius && (p - a).dot(&normal).abs() < 1e-9);

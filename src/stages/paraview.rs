@@ -434,13 +434,8 @@ fn edges(
     let path = format!("{path}.edges");
     let alone = shown.iter().any(|shown| matches!(shown, Shown::Wireframe(_)));
     let Some(given) = &spec.edges else {
-        let usual = EdgesPlan {
-            over: None,
-            color_by: EdgeColor::Depth,
-            hidden: HiddenEdges::Thin,
-            radius: None,
-            skin: SKIN,
-        };
+        let usual =
+            EdgesPlan { over: None, color_by: EdgeColor::Depth, hidden: HiddenEdges::Thin, radius: None, skin: SKIN };
         return Ok(alone.then_some(usual));
     };
     let plan = &resolver.plan;
@@ -462,7 +457,10 @@ fn edges(
             return Err(Invalid::new(key, message));
         };
         if !shown.iter().any(|&shown| matches!(shown, Shown::Image(_)) && shown.render(plan) == Some(render)) {
-            let message = format!("`{id}` is seen by `{}`, of which no image is shown here; add that to `input`", plan.id(render));
+            let message = format!(
+                "`{id}` is seen by `{}`, of which no image is shown here; add that to `input`",
+                plan.id(render)
+            );
             return Err(Invalid::new(key, message));
         }
     }

@@ -178,9 +178,8 @@ impl<const D: usize> Cut<D> {
             ],
         };
         let turned = |part: &[(usize, usize)]| {
-            let column = |&(a, b): &(usize, usize)| {
-                Vector64::<D>::from_fn(|r, _| 0.5 * (f64::from(r == a) + f64::from(r == b)))
-            };
+            let column =
+                |&(a, b): &(usize, usize)| Vector64::<D>::from_fn(|r, _| 0.5 * (f64::from(r == a) + f64::from(r == b)));
             determinant::<D>(&std::array::from_fn(|i| column(&part[i]))) < 0.0
         };
         let made = parts.into_iter().map(|part| {
@@ -243,7 +242,8 @@ fn flat_cap<const D: usize>(
         })
         .collect();
     // Of the two ways round the edges may run, one has the region on the left.
-    let area: f64 = edges.iter().map(|[a, b]| (flat[*a as usize], flat[*b as usize])).map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum();
+    let area: f64 =
+        edges.iter().map(|[a, b]| (flat[*a as usize], flat[*b as usize])).map(|(p, q)| p[0] * q[1] - p[1] * q[0]).sum();
     let edges: Vec<[u32; 2]> = if area < 0.0 { edges.iter().map(|&[a, b]| [b, a]).collect() } else { edges };
     let triangles = fill::section::triangles(&flat, &edges)
         .map_err(|at| format!("passes through itself near {:?}", flat[at as usize]))?;

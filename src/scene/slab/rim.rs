@@ -44,7 +44,8 @@ pub fn divide<const D: usize>(
         for point in points {
             let place = vertices[point as usize];
             let distance = |edge: &[u32; 2]| along(&edge.map(|v| vertices[v as usize]), &place).1;
-            if let Some(edge) = [[a, b], [a, c], [b, c]].into_iter().min_by(|e, f| distance(e).total_cmp(&distance(f))) {
+            if let Some(edge) = [[a, b], [a, c], [b, c]].into_iter().min_by(|e, f| distance(e).total_cmp(&distance(f)))
+            {
                 edges.entry(edge).or_default().push(point);
             }
         }

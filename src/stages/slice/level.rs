@@ -53,16 +53,20 @@ impl LevelPlan {
             return refuse("axis", "is for `peel: hopf` alone; take it out");
         }
         match (spec.peel, dimension) {
-            (Some(_), Dimension::Three) => {
-                refuse("peel", "the scene is 3D, and peels are of hyperspheres in 4D; `normal: [0, 0, 1]` slices along z")
-            }
+            (Some(_), Dimension::Three) => refuse(
+                "peel",
+                "the scene is 3D, and peels are of hyperspheres in 4D; `normal: [0, 0, 1]` slices along z",
+            ),
             (Some(PeelWord::Hopf), Dimension::Four) => {
                 let axis = spec.axis.unwrap_or([0.0, 0.0, 1.0]);
                 for (i, &x) in axis.iter().enumerate() {
                     check_length(&format!("{path}.axis[{i}]"), x)?;
                 }
                 if axis.iter().all(|x| x.abs() < MIN_LENGTH) {
-                    return refuse("axis", "the axis is zero, and no angle is measured from that; try `axis: [0, 0, 1]`");
+                    return refuse(
+                        "axis",
+                        "the axis is zero, and no angle is measured from that; try `axis: [0, 0, 1]`",
+                    );
                 }
                 Ok(Self::Hopf { center: point(spec.center.as_deref(), &format!("{path}.center"), dimension)?, axis })
             }

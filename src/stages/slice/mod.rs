@@ -17,6 +17,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use self::file::Shown;
+pub use self::level::{LevelPlan, PeelWord};
 use super::describe::Counts;
 use super::names::file_names;
 use super::occlusion::{self, OcclusionPlan};
@@ -25,8 +27,6 @@ use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
 use super::write::vtu;
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
-use self::file::Shown;
-pub use self::level::{LevelPlan, PeelWord};
 use crate::geometry::Dimension;
 use crate::io::{self, AtomicFile, pvd};
 use crate::mesh::section::section;
@@ -215,7 +215,9 @@ impl Stage for SlicePlan {
             if found.faces.is_empty() && list.is_none() {
                 let what = match cut {
                     LevelPlan::Across(_) | LevelPlan::W => "the hyperplane meets nothing; the file is empty",
-                    LevelPlan::Hopf { .. } => "the torus meets nothing; the file is empty. Is `center` within the body?",
+                    LevelPlan::Hopf { .. } => {
+                        "the torus meets nothing; the file is empty. Is `center` within the body?"
+                    }
                 };
                 notes.push(format!("{}: {what}", plan.id(me)));
             }

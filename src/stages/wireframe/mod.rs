@@ -12,8 +12,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::camera::{CameraPlan, camera};
 use self::lines::Lines;
+use super::camera::{CameraPlan, camera};
 use super::describe::Counts;
 use super::projection::{ProjectionWord, StereographicPlan};
 use super::range::positive;
@@ -238,9 +238,8 @@ impl Stage for WireframePlan {
             View::Stereographic(projection) => {
                 // The checks before leave no projection that can't be.
                 let Some(map) = projection.map::<D>() else { return Ok(String::new()) };
-                Lines::projected(mesh, &map, &edges).map_err(|(why, object)| {
-                    projection.complain(me, plan, why, &mesh.objects[object as usize].name)
-                })?
+                Lines::projected(mesh, &map, &edges)
+                    .map_err(|(why, object)| projection.complain(me, plan, why, &mesh.objects[object as usize].name))?
             }
         };
         let mut notes = Vec::new();
