@@ -73,6 +73,25 @@ impl Document {
         yaml::decode(&self.root).map_err(|p| self.error(p))
     }
 
+    /// Puts a value in the place of what is written at a path, where complaints about it still point.
+    pub(super) fn put(&mut self, path: &str, value: &serde_json::Value) {
+        let Some((origin, _)) = self.origin(path) else { return };
+        let mut node = Some(&mut self.root);
+        for segment in yaml::parse_path(path).unwrap_or_default() {
+            node = node.and_then(|node| match (&segment, &mut node.value) {
+                (Segment::Key(key), Value::Map(entries)) => {
+                    entries.iter_mut().find(|entry| entry.key == *key).map(|entry| &mut entry.value)
+                }
+                (Segment::Index(index), Value::List(items)) => items.get_mut(*index),
+                _ => None,
+            });
+        }
+        if let Some(node) = node {
+            *node = yaml::node(yaml::from_json(value));
+            node.set_origin(origin);
+        }
+    }
+
     /// Line and column, from 1, of the value at a dotted path, or of its nearest part that is written. None if
     /// an override gave it, or if the path is malformed.
     pub fn locate(&self, path: &str) -> Option<(usize, usize)> {

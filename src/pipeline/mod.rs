@@ -30,6 +30,7 @@ mod yaml;
 use std::path::{Path, PathBuf};
 
 use crate::progress::{Progress, Silent};
+use crate::stages::fit::Fitted;
 use crate::stages::prepare::Prepared;
 use crate::stages::write::PROGRAM;
 use crate::stages::{Invalid, Plan, suggest};
@@ -66,16 +67,27 @@ impl Pipeline {
         for assignment in overrides {
             document.set(assignment)?;
         }
-        let spec: spec::PipelineSpec = document.decode()?;
-        let folder = spec.folder.iter().fold(document.folder(), |base, folder| base.join(folder));
-        let seed = spec.seed.unwrap_or(0);
-        let plan = Plan::new(&spec.name, seed, &spec.stages, folder, out);
-        let mut plan = plan.map_err(|invalid| document.refuse(invalid))?;
+        let (spec, mut plan) = Self::understood(&document, out.clone())?;
+        let fitted = plan.fit(&Silent).map_err(|invalid| document.refuse(invalid))?;
+        if !fitted.is_empty() {
+            fitted.iter().for_each(|Fitted { path, camera }| document.put(path, camera));
+            // What there is to say of it was said of what was written.
+            let warnings = std::mem::take(&mut plan.warnings);
+            plan = Plan { warnings, ..Self::understood(&document, out)?.1 };
+        }
         if let Some(program) = spec.program.filter(|program| program != PROGRAM) {
             let message = format!("was written by {program}, and this is {PROGRAM}, whose files may be others");
             plan.warnings.push(Invalid::new("program", message));
         }
         Ok(Pipeline { plan, document, inputs: spec.inputs.unwrap_or_default() })
+    }
+
+    /// What a document says, and what it means.
+    fn understood(document: &Document, out: Option<PathBuf>) -> Result<(spec::PipelineSpec, Plan), Error> {
+        let spec: spec::PipelineSpec = document.decode()?;
+        let folder = spec.folder.iter().fold(document.folder(), |base, folder| base.join(folder));
+        let plan = Plan::new(&spec.name, spec.seed.unwrap_or(0), &spec.stages, folder, out);
+        Ok((spec, plan.map_err(|invalid| document.refuse(invalid))?))
     }
 
     /// Builds the scenes for which `wanted` says so, and reads the occlusion files that are loaded into them and wanted

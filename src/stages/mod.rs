@@ -26,6 +26,7 @@ pub mod camera;
 pub mod cut;
 pub mod describe;
 mod error;
+pub(crate) mod fit;
 pub mod key;
 pub mod lighting;
 pub mod mesh;

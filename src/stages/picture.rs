@@ -222,9 +222,10 @@ fn filters<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<
 fn nothing_seen<const D: usize>(picture: &Renderer<D>) -> String {
     let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
     if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
-        "the scene lies wholly behind the camera; turn the camera, or move it back"
+        "the scene lies wholly behind the camera; let `camera: fit` place it, or turn it, or move it back"
     } else {
-        "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"
+        "no voxel's centre sees any of the scene; let `camera: fit` place the camera, look at the scene's place and size, or \
+         use more voxels"
     }
     .to_owned()
 }

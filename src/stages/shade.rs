@@ -101,6 +101,10 @@ impl Stage for ShadePlan {
                 resolver.warn(format!("{path}.dimension"), "has no effect without `camera`: the image tells its own");
                 None
             }
+            (Some(CameraSpec { fit: Some(true), .. }), _) => {
+                let message = "there is no scene that it could be fitted to; say where the image was seen from";
+                return Err(Invalid::new(format!("{path}.camera.fit"), message));
+            }
             (Some(camera), dimension) => {
                 let number = dimension.unwrap_or(4);
                 let dimension = Dimension::new(number).ok_or_else(|| {

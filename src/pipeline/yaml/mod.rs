@@ -17,7 +17,7 @@ mod path;
 mod problem;
 
 pub(super) use decode::decode;
-pub(super) use emit::{emit, fill, map, node};
+pub(super) use emit::{emit, fill, from_json, map, node};
 pub(super) use parse::parse;
 pub(super) use path::{Segment, parse_path, show_path};
 pub(super) use problem::Problem;
