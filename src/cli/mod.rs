@@ -5,20 +5,27 @@
 
 mod check;
 mod compare;
+mod completions;
 mod console;
 mod devices;
+mod example;
 mod info;
+mod man;
 mod options;
+mod page;
 mod run;
 mod schema;
 mod study;
+mod version;
 mod watch;
 
 use std::borrow::Cow;
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
+use ao4d::io::AtomicFile;
 use ao4d::pipeline::RunError;
 use ao4d::text::for_terminal;
 use clap::{Parser, Subcommand};
@@ -44,7 +51,7 @@ enum Verb {
     Check(check::Check),
     /// Measure error against time of the occlusion methods on a pipeline's scene
     Study(study::Study),
-    /// Compare two volumes, meshes or occlusion files
+    /// Compare two volumes, meshes or occlusion files, or two folders of them
     Compare(compare::Compare),
     /// Tell what a file holds
     Info(info::Info),
@@ -52,6 +59,14 @@ enum Verb {
     Devices(devices::Devices),
     /// Print the JSON Schema of a pipeline, for editors
     Schema(schema::Schema),
+    /// Run a pipeline and put what it shows into one HTML file, for any browser
+    Page(page::Page),
+    /// Write one of the shipped pipelines, with what it reads; or list them
+    Example(example::Example),
+    /// Print what a shell needs to complete commands and options
+    Completions(completions::Completions),
+    /// Print a manual page, or write all of them
+    Man(man::Man),
 }
 
 /// How a verb ended well.
@@ -110,8 +125,33 @@ fn existing(file: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Writes a file, which appears when it is whole.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let written = AtomicFile::create(path).and_then(|mut file| {
+        file.write_all(bytes).map_err(AtomicFile::name_in(path))?;
+        file.commit()
+    });
+    written.map(|_| ()).map_err(|e| Failure::Failed(Box::new(e)))
+}
+
+/// Whether the command line asks for the version, and for more about it; clap answers to the first alone at once.
+fn asks_for_details() -> bool {
+    let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
+    let any = |words: &[&str]| arguments.iter().any(|a| words.iter().any(|word| a == word));
+    let only = |a: &OsString| ["--version", "-V", "--verbose", "-v", "-Vv", "-vV"].iter().any(|word| a == word);
+    let both = any(&["--version", "-V"]) && any(&["--verbose", "-v"]) || any(&["-Vv", "-vV"]);
+    both && arguments.iter().all(only)
+}
+
 /// Parses the command line and does what it says.
 pub fn main() -> ExitCode {
+    if asks_for_details() {
+        let messages = Messages { quiet: false, verbose: true, log_level: None, progress: None };
+        return match version::print(&Console::new(messages)) {
+            Ok(_) => ExitCode::SUCCESS,
+            Err(_) => ExitCode::from(3),
+        };
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(refusal) => {
@@ -135,6 +175,10 @@ pub fn main() -> ExitCode {
         Verb::Info(info) => info.execute(&console),
         Verb::Devices(devices) => devices.execute(&console),
         Verb::Schema(schema) => schema.execute(&console),
+        Verb::Page(page) => page.execute(&console),
+        Verb::Example(example) => example.execute(&console),
+        Verb::Completions(completions) => completions.execute(&console),
+        Verb::Man(man) => man.execute(&console),
     };
     ExitCode::from(match result {
         Ok(Outcome::Done) => 0,

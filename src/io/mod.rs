@@ -20,6 +20,7 @@ pub mod image;
 mod inline;
 mod input;
 pub mod mesh;
+pub mod page;
 pub mod paraview;
 pub mod png;
 pub mod pvd;
@@ -29,7 +30,7 @@ pub mod vti;
 pub mod vtk;
 pub mod vtp;
 pub mod vtu;
-mod xml;
+pub(crate) mod xml;
 
 /// The name under which files tell of the pipeline that they were made by.
 pub const PIPELINE: &str = "pipeline";

@@ -12,6 +12,7 @@
 
 mod book;
 mod cache;
+mod compose;
 mod document;
 mod error;
 mod guard;
@@ -23,6 +24,7 @@ mod report;
 mod run;
 mod schema;
 mod settings;
+mod share;
 pub mod spec;
 mod study;
 mod yaml;
@@ -35,13 +37,15 @@ use crate::stages::prepare::Prepared;
 use crate::stages::write::PROGRAM;
 use crate::stages::{Invalid, Plan, suggest};
 
-pub use document::Document;
+pub use crate::stages::suggest::unknown as unknown_word;
+pub use document::{Document, STDIN};
 pub use error::{Error, Place, Refusal};
 pub use provenance::Told;
 pub use report::{FileReport, Report, StageTime};
-pub use run::{RunError, run};
+pub use run::{RunError, run, run_sharing};
 pub use schema::schema;
 pub use settings::{Backend, BackendError, Settings};
+pub use share::Shared;
 pub use study::{Study, study};
 
 /// A plan, and the text it was made from, which later complaints cite.
@@ -62,11 +66,45 @@ impl Pipeline {
         Self::from_document(Document::read(path)?, overrides, out)
     }
 
-    /// The same, from a text that was read already.
-    pub fn from_document(mut document: Document, overrides: &[String], out: Option<PathBuf>) -> Result<Self, Error> {
+    /// The same for a document that may have a `sweep`: the pipelines that it makes, in order. With `out` those of a sweep go into
+    /// folders within it.
+    ///
+    /// # Errors
+    /// Whatever is wrong with one.
+    pub fn swept(document: Document, overrides: &[String], out: Option<PathBuf>) -> Result<Vec<Self>, Error> {
+        let place = |document: &Document| {
+            let inner = |out: &PathBuf| if document.swept().is_empty() { out.clone() } else { out.join(document.swept()) };
+            out.as_ref().map(inner)
+        };
+        let documents = Self::documents(document, overrides)?;
+        documents.into_iter().map(|document| (place(&document), document)).map(|(out, d)| Self::resolve(d, out)).collect()
+    }
+
+    /// A document with overrides, and all the pipelines that it stands for.
+    fn documents(mut document: Document, overrides: &[String]) -> Result<Vec<Document>, Error> {
         for assignment in overrides {
             document.set(assignment)?;
         }
+        document.expand()
+    }
+
+    /// The same, from a text that was read already.
+    ///
+    /// # Errors
+    /// Whatever is wrong with it; a `sweep`, which makes several ([`Pipeline::swept`]).
+    pub fn from_document(document: Document, overrides: &[String], out: Option<PathBuf>) -> Result<Self, Error> {
+        let mut documents = Self::documents(document, overrides)?;
+        match (documents.pop(), documents.len()) {
+            (Some(document), 0) => Self::resolve(document, out),
+            (Some(document), more) => {
+                let message = format!("makes {} pipelines, and one is expected; take it out by --set sweep=", more + 1);
+                Err(document.refuse(Invalid::new("sweep", message)))
+            }
+            (None, _) => unreachable!("a document stands for a pipeline at least"),
+        }
+    }
+
+    fn resolve(mut document: Document, out: Option<PathBuf>) -> Result<Self, Error> {
         let (spec, mut plan) = Self::understood(&document, out.clone())?;
         let fitted = plan.fit(&Silent).map_err(|invalid| document.refuse(invalid))?;
         if !fitted.is_empty() {

@@ -2,11 +2,43 @@
 //!
 //! It is derived from the very types that decode a pipeline, so it can't know other keys than they do.
 
+use serde_json::{Value, json};
+
 use super::spec::PipelineSpec;
 
+/// What the schema is called, wherever it lies.
+const ID: &str = "urn:ao4d:schema:pipeline";
+
 /// The schema, as JSON Schema draft 2020-12.
-pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(PipelineSpec).to_value()
+pub fn schema() -> Value {
+    let mut schema = schemars::schema_for!(PipelineSpec).to_value();
+    if let Some(items) = schema.pointer_mut("/properties/stages/items") {
+        let file = json!({ "type": "string", "description": "A file whose stages stand here." });
+        let include = json!({
+            "type": "object", "description": "The stages of another file.", "properties": { "include": file },
+            "required": ["include"], "additionalProperties": false
+        });
+        *items = json!({ "anyOf": [items.take(), include] });
+    }
+    allow_own_keys(&mut schema);
+    if let Value::Object(map) = &mut schema {
+        map.insert("$id".to_owned(), ID.into());
+    }
+    schema
+}
+
+/// Keys that begin with `x-` are the user's own, wherever keys are.
+fn allow_own_keys(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            if map.contains_key("properties") {
+                map.insert("patternProperties".to_owned(), json!({ "^x-": true }));
+            }
+            map.values_mut().for_each(allow_own_keys);
+        }
+        Value::Array(items) => items.iter_mut().for_each(allow_own_keys),
+        _ => {}
+    }
 }
 
 #[cfg(test)]
@@ -14,7 +46,6 @@ mod tests {
     use std::collections::BTreeSet;
 
     use serde::de::DeserializeOwned;
-    use serde_json::Value;
 
     use super::*;
     use crate::pipeline::spec::InputSpec;

@@ -127,7 +127,7 @@ impl Shown {
     }
 
     /// The render that it is of.
-    fn render(self, plan: &Plan) -> Ref<RenderPlan> {
+    pub(super) fn render(self, plan: &Plan) -> Ref<RenderPlan> {
         match self {
             Self::Image(write) => plan[write].render,
             Self::Animation(animation) => plan[animation].render,
@@ -135,7 +135,7 @@ impl Shown {
     }
 
     /// What its files hold.
-    fn arrays(self, plan: &Plan) -> &[Aov] {
+    pub(super) fn arrays(self, plan: &Plan) -> &[Aov] {
         match self {
             Self::Image(write) => &plan[write].arrays,
             Self::Animation(animation) => &plan[animation].arrays,
