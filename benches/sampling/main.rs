@@ -8,7 +8,7 @@
 //! Each candidate sees a hemisphere as the unit (D-1)-ball that it projects onto, and asks for the visibility of points
 //! of it. Only `random`, `sobol` and `adaptive` are in the program; the others are here because they were tried.
 
-#[path = "../../tests/methods/scenes.rs"]
+#[path = "../../tests/library/methods/scenes.rs"]
 mod scenes;
 
 mod candidates;

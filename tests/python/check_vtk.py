@@ -1,6 +1,6 @@
 """What VTK's own readers and writers say about image and mesh files.
 
-    check_vtk.py ours FOLDER     reads every file that tests/vtk_files.rs has put there, and checks each number
+    check_vtk.py ours FOLDER     reads every file that tests/paraview/vtk_files.rs has put there, and checks each number
     check_vtk.py theirs FOLDER   writes files there in every way that VTK knows, each beside a reference in plain text
 
 Prints how many files there were; exits with 1 and a message at the first thing that is wrong.
@@ -40,7 +40,7 @@ def read(reader, path):
     return reader.GetOutput()
 
 
-# The image and the mesh of tests/vtk_files.rs.
+# The image and the mesh of tests/paraview/vtk_files.rs.
 
 
 def ours_image(n):

@@ -14,9 +14,7 @@ use ao4d::progress::Silent;
 use ao4d::trace::cpu::CpuBackend;
 use ao4d::trace::{Sampling, ShadingPoint, Target};
 
-mod support;
-
-use support::{Random, mesh};
+use crate::support::{Random, mesh};
 
 fn same_bits<const D: usize>() {
     let mesh: Mesh<D> = mesh(&Random(2).soup(40, 0.6, false));

@@ -4,7 +4,7 @@ use ao4d::geometry::{Vector, widen};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-use crate::scenes::*;
+use super::scenes::*;
 
 in_3d_and_4d! {
     nothing_occludes_nothing orthant half_space fold enclosed_in_a_box enclosed_in_a_ball convex_body_alone ball_above_a_horizon circular_cone random_soup_by_rays

@@ -1,16 +1,13 @@
 //! Texts of users damaged at random (pipelines, overrides, formulas, sidecars): each is read or refused with a place, quickly,
 //! and never a panic. How long it looks, and where: `support/fuzz.rs`.
 
-#[path = "support/fuzz.rs"]
-mod fuzz;
-
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use crate::fuzz::{self, Random, damage};
 use ao4d::occlusion::Sidecar;
 use ao4d::pipeline::{Document, Pipeline};
 use ao4d::scene::{ObjectSpec, build_object};
-use fuzz::{Random, damage};
 use serde_json::json;
 
 /// What has a meaning in YAML or in a formula.

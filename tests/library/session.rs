@@ -12,7 +12,7 @@ use ao4d::stages::occlusion::{OcclusionPlan, OcclusionSource};
 use ao4d::stages::render::RenderPlan;
 use ao4d::stages::scene::AnyMesh;
 
-#[path = "../examples/mesh_to_volume.rs"]
+#[path = "../../examples/mesh_to_volume.rs"]
 mod mesh_to_volume;
 
 #[test]

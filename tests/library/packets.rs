@@ -9,9 +9,7 @@ use ao4d::progress::Silent;
 use ao4d::trace::cpu::{CpuBackend, Level, PacketTracer, ScalarBackend};
 use ao4d::trace::{RayBackend, Sampler, Sampling, ShadingPoint, Target};
 
-mod support;
-
-use support::{Random, mesh};
+use crate::support::{Random, mesh};
 
 fn soup<const D: usize>(seed: u32, count: usize, size: f64, coarse: bool) -> Surface<D> {
     Random(seed).soup(count, size, coarse)

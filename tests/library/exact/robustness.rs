@@ -5,7 +5,7 @@ use ao4d::occlusion::exact::{Budget, Hemisphere, visible_fraction};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-use crate::scenes::*;
+use super::scenes::*;
 
 in_3d_and_4d! {
     subdivided_occluder complementary_parts_of_an_enclosure copies_moved_by_an_ulp symmetric_scenes slivers tiny_distances over_budget

@@ -1,6 +1,6 @@
 //! The help texts are part of what users learn, so changes to them are seen: each is held in `tests/snapshots/`.
 //!
-//! After a change that is meant, `AO4D_BLESS=1 cargo test --test cli_help` writes them anew.
+//! After a change that is meant, `AO4D_BLESS=1 cargo test --test program cli_help` writes them anew.
 
 use std::path::Path;
 use std::process::Command;

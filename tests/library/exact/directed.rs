@@ -7,7 +7,7 @@ use ao4d::occlusion::exact::{Budget, Hemisphere};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-use crate::scenes::*;
+use super::scenes::*;
 
 in_3d_and_4d! {
     open_hidden_half_and_fold simplices_apart_from_each_other crossing_simplices_by_rays

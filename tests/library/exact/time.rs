@@ -3,7 +3,7 @@
 use ao4d::geometry::{Vector, narrow, widen};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 
-use crate::scenes::*;
+use super::scenes::*;
 
 /// Prints the time per vertex for closed bodies beside a partner; run with `--release --ignored --nocapture`.
 #[test]

@@ -21,9 +21,7 @@ use ao4d::trace::RayBackend;
 use ao4d::trace::cpu::CpuBackend;
 use serde_json::{Value, json};
 
-mod support;
-
-use support::{Random, mesh};
+use crate::support::{Random, mesh};
 
 const PERSPECTIVE: Projection = Projection::Perspective { field_of_view: 90.0 };
 

@@ -2,15 +2,12 @@
 //!
 //! How long it looks, and where: `support/fuzz.rs`.
 
-#[path = "support/fuzz.rs"]
-mod fuzz;
-
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
+use crate::fuzz::{self, damage};
 use ao4d::scene::{ObjectSpec, build_object};
-use fuzz::damage;
 use serde_json::{Value, json};
 
 const POINTS: [usize; 4] = [4, 3, 3, 2];

@@ -1,11 +1,9 @@
 //! Every pipeline of the repository is run, with smaller images and fewer rays, and what it promises is held against what it
 //! leaves. Those of the thesis's figures are run as they are, for the values that they should have.
 
-#[path = "support/smaller.rs"]
-mod smaller;
-
 use std::path::Path;
 
+use crate::smaller;
 use ao4d::io::vtk;
 use ao4d::pipeline::{Pipeline, Report, Settings, run};
 use ao4d::progress::Silent;

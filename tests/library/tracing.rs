@@ -18,9 +18,7 @@ use ao4d::trace::cpu::{CpuBackend, ScalarBackend};
 use ao4d::trace::{NOTHING, RayBackend, Sampling, ShadingPoint};
 use ao4d::volume::Values;
 
-mod support;
-
-use support::{Random, mesh};
+use crate::support::{Random, mesh};
 
 fn soup<const D: usize>(random: &mut Random, count: usize, coarse: bool) -> Mesh<D> {
     mesh(&random.soup(count, 0.5, coarse))

@@ -5,7 +5,7 @@ use ao4d::progress::Silent;
 use ao4d::trace::cpu::PacketTracer;
 use ao4d::trace::{Sampling, ShadingPoint};
 
-use crate::scenes;
+use super::scenes;
 
 in_3d_and_4d! { agrees_with_rays }
 

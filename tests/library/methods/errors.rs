@@ -8,7 +8,7 @@ use ao4d::progress::Silent;
 use ao4d::trace::cpu::{CpuBackend, PacketTracer, estimate_at};
 use ao4d::trace::{Estimate, Sampler, Sampling, ShadingPoint, Target};
 
-use crate::scenes::{self, Scene};
+use super::scenes::{self, Scene};
 
 in_3d_and_4d! { estimates_are_calibrated targets_are_met half_the_error_of_random_rays fast_is_slow }
 

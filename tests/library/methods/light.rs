@@ -17,7 +17,7 @@ use ao4d::trace::cpu::CpuBackend;
 use ao4d::trace::{RayBackend, Sampler, Sampling, Sequence, ShadingPoint, Surroundings};
 use ao4d::volume::{Array, Values, Volume};
 
-use crate::scenes::{mesh, soup};
+use super::scenes::{mesh, soup};
 
 in_3d_and_4d! {
     vectors_by_rays_and_in_closed_form a_linear_sky_is_lit_exactly surfaces_of_one_radiosity an_endless_fold
