@@ -52,7 +52,7 @@ fn pages() -> std::io::Result<Vec<(String, Vec<u8>)>> {
     command.build();
     let of = |name: String, command: clap::Command| {
         let mut text = Vec::new();
-        Page::new(command.name(name.clone())).render(&mut text)?;
+        Page::new(command).render(&mut text)?;
         Ok((name, text))
     };
     let verbs: Vec<clap::Command> = command.get_subcommands().cloned().collect();

@@ -76,7 +76,7 @@ impl Document {
                 Some(Origin::File { line, column }) => Origin::Included { file, line, column },
                 _ => Origin::Included { file, line: 1, column: 1 },
             };
-            return Err(document.error(Problem { origin: Some(origin), ..problem }));
+            return Err(document.error(problem.at(origin)));
         }
         found.map_err(|p| document.error(p))?;
         document.root = root;

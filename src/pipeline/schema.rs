@@ -58,6 +58,7 @@ mod tests {
     use crate::stages::cut::{Axis, Plane};
     use crate::stages::mesh::MeshSpec;
     use crate::stages::occlusion::{Method, OcclusionSpec};
+    use crate::stages::page::PageSpec;
     use crate::stages::paraview::{ColorBy, ParaviewSpec, Reader, Style};
     use crate::stages::render::{RenderSpec, Shading};
     use crate::stages::scene::SceneSpec;
@@ -113,6 +114,7 @@ mod tests {
             ("ScreenSpaceSpec", decoder_knows::<ScreenSpaceSpec>("{zzz: 1}")),
             ("ShadeSpec", decoder_knows::<ShadeSpec>("{zzz: 1}")),
             ("InputSpec", decoder_knows::<InputSpec>("{zzz: 1}")),
+            ("PageSpec", decoder_knows::<PageSpec>("{zzz: 1}")),
             ("ParaviewSpec", decoder_knows::<ParaviewSpec>("{zzz: 1}")),
             ("Plane", decoder_knows::<Plane>("{zzz: 1}")),
             ("Method", decoder_knows::<Method>("zzz")),

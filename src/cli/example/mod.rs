@@ -41,7 +41,7 @@ impl Example {
         let plain = |name: &str| name.trim_end_matches(".yaml").replace('-', "_");
         let wanted = plain(name);
         // The last part of a name will do where it is one example's alone.
-        let ends = |known: &str| known.rsplit('/').next() == Some(&wanted);
+        let ends = |known: &str| known.rsplit('/').next() == Some(wanted.as_str());
         let found: Vec<_> = match PIPELINES.iter().find(|(known, _)| *known == wanted) {
             Some(found) => vec![found],
             None if wanted == "all" => PIPELINES.iter().collect(),

@@ -92,15 +92,20 @@
     vec3 s = (a - o) / d, t = (b - o) / d, n = min(s, t), f = max(s, t);
     return vec2(max(max(n.x, n.y), n.z), min(min(f.x, f.y), f.z));
   }
+  // Whether a point of the unit cube's surface is near an edge of it.
+  bool edge(vec3 p) {
+    vec3 inwards = min(p, 1.0 - p) * extent;
+    return dot(vec3(lessThan(inwards, vec3(0.005 * distance_ / 4.3))), vec3(1.0)) > 1.5;
+  }
   void main() {
     vec2 at = (2.0 * gl_FragCoord.xy - size) / min(size.x, size.y);
     second = comparing && gl_FragCoord.x > split * size.x;
     vec3 o = turn * vec3(0.0, 0.0, distance_) / extent + 0.5;
     vec3 d = turn * normalize(vec3(at * 0.41, -1.0)) / extent;
     d += vec3(lessThan(abs(d), vec3(1e-6))) * 1e-6;
-    colour = vec4(1.0);
-    // The frame of the whole image, faint.
+    // Behind all, the edges of the whole image.
     vec2 whole = within(o, d, vec3(0.0), vec3(1.0));
+    colour = vec4(vec3(whole.y > max(whole.x, 0.0) && (edge(o + d * whole.x) || edge(o + d * whole.y)) ? 0.83 : 1.0), 1.0);
     vec2 range = within(o, d, low, high);
     range.x = max(range.x, 0.0);
     if (whole.y <= max(whole.x, 0.0)) return;
@@ -141,7 +146,7 @@
       fresh = false;
       t += step_;
     }
-    if (volume) colour = vec4(sum + left, 1.0);
+    if (volume) colour = vec4(sum + left * colour.rgb, 1.0);
   }`;
   const build = (type, text) => {
     const shader = gl.createShader(type);
@@ -191,7 +196,7 @@
   }
 
   // ---- What is shown.
-  const FIRST = { yaw: 0.55, pitch: 0.4, distance: 4.3 };
+  const FIRST = { yaw: 0.55, pitch: 0.4, distance: 4.9 };
   const state = { series: 0, frame: 0, other: -1, occlusion: true, volume: false, cut: 'none', axis: 2, at: [0.5, 0.5, 0.5],
     split: 0.5, density: 0.35, playing: false, ...FIRST };
   const CUTS = ['none', 'octant', 'half', 'slice'];
@@ -278,7 +283,7 @@
       row.hidden = state.cut !== 'octant' && a !== state.axis;
       $('at' + a).value = state.at[a];
       const place = series.origin[a] + (state.at[a] * series.dimensions[a] - 0.5) * series.spacing[a];
-      $('told' + a).textContent = place.toPrecision(3);
+      $('told' + a).textContent = Math.abs(place) < 1e-6 * series.spacing[a] ? '0' : Number(place.toPrecision(3));
     }
     $('split-row').hidden = state.other === -1; $('split').value = state.split;
     $('edge').hidden = $('left').hidden = $('right').hidden = state.other === -1;
@@ -402,7 +407,8 @@
         await timed(times.frame, async () => { await load(0, state.series, state.frame); draw(); });
       }
       const median = (list) => list.sort((a, b) => a - b)[list.length >> 1];
-      document.documentElement.dataset.measured = JSON.stringify({ draw: median(times.draw), frame: median(times.frame), width: canvas.width, height: canvas.height });
+      const measured = document.documentElement.dataset.measured = JSON.stringify({ draw: median(times.draw), frame: median(times.frame), width: canvas.width, height: canvas.height });
+      console.info('measured ' + measured);
       tell();
     }
     document.documentElement.dataset.state = document.documentElement.dataset.state === 'failed' ? 'failed' : 'ready';
