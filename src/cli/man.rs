@@ -50,7 +50,7 @@ impl Man {
 fn pages() -> std::io::Result<Vec<(String, Vec<u8>)>> {
     let mut command = Cli::command().disable_help_subcommand(true);
     command.build();
-    let of = |name: String, command: clap::Command| {
+    let of = |name: String, command: clap::Command| -> std::io::Result<_> {
         let mut text = Vec::new();
         Page::new(command).render(&mut text)?;
         Ok((name, text))

@@ -128,7 +128,7 @@ fn existing(file: &Path) -> Result<(), Failure> {
 /// Writes a file, which appears when it is whole.
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let written = AtomicFile::create(path).and_then(|mut file| {
-        file.write_all(bytes).map_err(AtomicFile::name_in(path))?;
+        file.write_all(bytes).map_err(|cause| AtomicFile::name_in(path)(cause.into()))?;
         file.commit()
     });
     written.map(|_| ()).map_err(|e| Failure::Failed(Box::new(e)))

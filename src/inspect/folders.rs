@@ -152,14 +152,17 @@ fn pixels(path: &Path) -> Result<((u32, u32), usize, Vec<u8>), Error> {
 
 /// Compares byte by byte.
 fn bytes(a: &Path, b: &Path) -> Result<Comparison, Error> {
-    let open = |path: &Path| {
+    let open = |path: &Path| -> Result<_, Error> {
         let file = crate::input::open(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
         Ok(BufReader::new(file).bytes())
     };
     let mut at = 0u64;
     let (mut x, mut y) = (open(a)?, open(b)?);
     loop {
-        let failed = |path: &Path| move |cause| Error::Open { path: path.into(), cause };
+        let failed = |path: &Path| {
+            let path = path.to_owned();
+            move |cause| Error::Open { path, cause }
+        };
         let pair = (x.next().transpose().map_err(failed(a))?, y.next().transpose().map_err(failed(b))?);
         match pair {
             (None, None) => return Ok(Comparison { same: true, ..Comparison::default() }),

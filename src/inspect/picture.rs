@@ -4,7 +4,6 @@
 //! Differences are shown from white, none, by red to black, the largest; those within the tolerance are blue. Where the
 //! largest lies outside the slices, the numbers still tell where.
 
-use std::io::Write;
 use std::path::Path;
 
 use super::compare::Tolerance;
@@ -55,8 +54,7 @@ pub fn write(a: &Path, b: &Path, tolerance: &Tolerance, into: &Path) -> Result<b
         },
     ];
     let mut file = AtomicFile::create(into)?;
-    png::write(&mut file, &[&rows[0], &rows[1], &rows[2]])?;
-    file.flush().map_err(AtomicFile::name_in(into))?;
+    png::write(&mut file, &[&rows[0], &rows[1], &rows[2]]).map_err(AtomicFile::name_in(into))?;
     file.commit()?;
     Ok(true)
 }

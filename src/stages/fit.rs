@@ -157,7 +157,7 @@ fn compose<const D: usize>(frame: &[Vector64<D>; D], across: &[f64], back: f64) 
 
 /// A number to a hundred-thousandth of a size.
 fn rounded(x: f64, size: f64) -> f64 {
-    let places = (5.0 - size.log10().floor()).clamp(0.0, 30.0) as usize;
+    let places = (5.0 - libm::log10(size).floor()).clamp(0.0, 30.0) as usize;
     // Through text, so that what is written is what is meant. No negative zero.
     format!("{x:.places$}").parse::<f64>().map_or(x, |x| x + 0.0)
 }

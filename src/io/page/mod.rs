@@ -6,12 +6,13 @@
 
 mod pack;
 
-use std::io::{self, Write};
+use std::io::Write;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::json;
 
+use super::Error;
 use crate::volume::Grid;
 
 pub use pack::{Palette, Voxels};
@@ -39,7 +40,7 @@ pub struct Series {
 ///
 /// # Errors
 /// If writing fails.
-pub fn write(sink: &mut impl Write, title: &str, program: &str, rate: f64, series: &[Series]) -> io::Result<()> {
+pub fn write(sink: &mut impl Write, title: &str, program: &str, rate: f64, series: &[Series]) -> Result<(), Error> {
     let described: Vec<_> = series
         .iter()
         .map(|series| {
@@ -79,7 +80,7 @@ pub fn write(sink: &mut impl Write, title: &str, program: &str, rate: f64, serie
         }
         rest = after;
     }
-    write!(sink, "{rest}")
+    Ok(write!(sink, "{rest}")?)
 }
 
 #[cfg(test)]

@@ -9,11 +9,12 @@
 //! stands, so it costs nothing. `page.js` does the same the other way round.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::io::Write;
 
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 
+use crate::io::Error;
 use crate::volume::Grid;
 
 /// The brightest shade.
@@ -107,7 +108,7 @@ impl Palette {
     ///
     /// # Errors
     /// If packing fails.
-    pub fn pack(&self, voxels: &Voxels) -> io::Result<Vec<u8>> {
+    pub fn pack(&self, voxels: &Voxels) -> Result<Vec<u8>, Error> {
         let [w, h, d] = voxels.grid.dimensions;
         let (n, layer) = (w * h * d, w * h);
         let mut packed = vec![0u8; 3 * n];
@@ -147,7 +148,7 @@ impl Palette {
         }
         let mut encoder = DeflateEncoder::new(Vec::new(), Compression::best());
         encoder.write_all(&packed)?;
-        encoder.finish()
+        Ok(encoder.finish()?)
     }
 }
 

@@ -21,6 +21,9 @@
   const sources = page.series.map((_, s) => $('data' + s).textContent.trim().split('\n'));
   const unpacked = new Map();
 
+  // The number of blocks of four voxels along each axis.
+  const blocks = (dimensions) => dimensions.map((n) => (n + 3) >> 2);
+
   async function unpack(series, frame) {
     const key = series + ':' + frame;
     if (unpacked.has(key)) return unpacked.get(key);
@@ -33,28 +36,32 @@
     const cover = bytes.subarray(0, n), colour = bytes.subarray(n, 2 * n), shade = bytes.subarray(2 * n, 3 * n);
     // Colours times coverage, and shade times coverage, so that between voxels what is empty has no weight.
     const rgba = new Uint8Array(4 * n), shaded = new Uint8Array(n);
+    // Which blocks of voxels hold anything, or lie beside what does: rays pass the others in one step.
+    const [across, high, deep] = blocks([w, h, d]), held = new Uint8Array(across * high * deep);
+    const reds = palette.map((p) => p[0]), greens = palette.map((p) => p[1]), blues = palette.map((p) => p[2]);
+    const scale = 255 / page.shades;
     for (let k = 0, i = 0; k < d; k++) {
       for (let j = 0; j < h; j++) {
         for (let x = 0; x < w; x++, i++) {
-          const left = x ? i - 1 : j ? i - w : k ? i - layer : -1;
-          cover[i] += left < 0 ? 0 : cover[left];
-          colour[i] += left < 0 ? 0 : colour[left];
-          let sum = 0, count = 0;
-          if (x) { sum += shade[i - 1]; count++; }
-          if (j) { sum += shade[i - w]; count++; }
-          if (k) { sum += shade[i - layer]; count++; }
-          shade[i] += count ? Math.floor(sum / count) : 0;
+          let sum = 0, count = 0, left = -1;
+          if (k) { left = i - layer; sum += shade[left]; count++; }
+          if (j) { left = i - w; sum += shade[left]; count++; }
+          if (x) { left = i - 1; sum += shade[left]; count++; }
+          if (count) { cover[i] += cover[left]; colour[i] += colour[left]; shade[i] += (sum / count) | 0; }
           const c = cover[i] * 17;
           if (c) {
-            const [r, g, b] = palette[colour[i]];
-            rgba[4 * i] = (r * c + 127) / 255; rgba[4 * i + 1] = (g * c + 127) / 255; rgba[4 * i + 2] = (b * c + 127) / 255;
+            const n = colour[i], share = c / 255;
+            rgba[4 * i] = reds[n] * share + 0.5; rgba[4 * i + 1] = greens[n] * share + 0.5; rgba[4 * i + 2] = blues[n] * share + 0.5;
             rgba[4 * i + 3] = c;
-            shaded[i] = (shade[i] * 255 / page.shades * c + 127) / 255;
+            for (let z = Math.max(k - 1, 0) >> 2; z <= Math.min(k + 1, d - 1) >> 2; z++)
+              for (let y = Math.max(j - 1, 0) >> 2; y <= Math.min(j + 1, h - 1) >> 2; y++)
+                for (let b = Math.max(x - 1, 0) >> 2; b <= Math.min(x + 1, w - 1) >> 2; b++) held[b + across * (y + high * z)] = 255;
+            shaded[i] = shade[i] * scale * share + 0.5;
           }
         }
       }
     }
-    const found = { rgba, shaded };
+    const found = { rgba, shaded, held };
     unpacked.set(key, found);
     // Old frames go where many are large.
     if (unpacked.size * n > 96e6) unpacked.delete(unpacked.keys().next().value);
@@ -66,7 +73,7 @@
   void main() { gl_Position = vec4(vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0), 0.0, 1.0); }`;
   const fragment = `#version 300 es
   precision highp float; precision highp sampler3D;
-  uniform sampler3D rgbaA, shadeA, rgbaB, shadeB;
+  uniform sampler3D rgbaA, shadeA, heldA, rgbaB, shadeB, heldB;
   uniform vec2 size; uniform float split, distance_, density;
   uniform mat3 turn; uniform vec3 extent, voxels;
   uniform vec3 low, high, corner, side;
@@ -112,7 +119,7 @@
     if (range.y <= range.x) return;
     float cell = 1.0 / max(max(voxels.x * abs(d.x), voxels.y * abs(d.y)), voxels.z * abs(d.z));
     vec3 sum = vec3(0.0); float left = 1.0;
-    float step_ = cell * (volume ? 0.7 : 0.6);
+    float step_ = cell * (volume ? 0.8 : 0.7);
     float t = range.x + (volume ? step_ * fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) : 1e-5);
     bool before = false, fresh = true;
     for (int i = 0; i < 1600; i++) {
@@ -123,6 +130,15 @@
         vec3 end = mix(vec3(0.0), vec3(1.0), step(0.0, side));
         vec2 inner = within(o, d, min(corner, end), max(corner, end));
         t = max(inner.y, t) + 1e-4 * cell + 1e-6; fresh = true; continue;
+      }
+      ivec3 block = ivec3(clamp(p, 0.0, 0.9999) * voxels) >> 2;
+      if ((second ? texelFetch(heldB, block, 0).r : texelFetch(heldA, block, 0).r) == 0.0) {
+        // Nothing is here: on to where the block ends.
+        vec3 end = (vec3(block) + step(vec3(0.0), d)) * 4.0 / voxels;
+        vec3 there = (end - o) / d;
+        t = max(t, min(min(there.x, there.y), there.z)) + 0.02 * cell;
+        fresh = false;
+        continue;
       }
       if (volume) {
         float a = look(p);
@@ -168,30 +184,30 @@
   const places = new Map();
   const uniform = (name) => { if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name)); return places.get(name); };
 
-  // Two textures a side: what is shown, and what it is compared with.
-  const sides = [0, 1].map((side) => ({ holds: '', textures: [0, 1].map((kind) => {
+  // Three textures a side: what is shown, and what it is compared with.
+  const sides = [0, 1].map((side) => ({ holds: '', textures: [0, 1, 2].map((kind) => {
     const texture = gl.createTexture();
-    gl.activeTexture(gl.TEXTURE0 + 2 * side + kind);
+    gl.activeTexture(gl.TEXTURE0 + 3 * side + kind);
     gl.bindTexture(gl.TEXTURE_3D, texture);
-    for (const [key, value] of [[gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
+    const filter = kind === 2 ? gl.NEAREST : gl.LINEAR;
+    for (const [key, value] of [[gl.TEXTURE_MIN_FILTER, filter], [gl.TEXTURE_MAG_FILTER, filter],
       [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_R, gl.CLAMP_TO_EDGE]])
       gl.texParameteri(gl.TEXTURE_3D, key, value);
     return texture;
   }) }));
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-  ['rgbaA', 'shadeA', 'rgbaB', 'shadeB'].forEach((name, unit) => gl.uniform1i(uniform(name), unit));
+  ['rgbaA', 'shadeA', 'heldA', 'rgbaB', 'shadeB', 'heldB'].forEach((name, unit) => gl.uniform1i(uniform(name), unit));
 
   async function load(side, series, frame) {
     const key = series + ':' + frame;
     if (sides[side].holds === key) return;
-    const { rgba, shaded } = await unpack(series, frame);
-    const [w, h, d] = page.series[series].dimensions;
-    gl.activeTexture(gl.TEXTURE0 + 2 * side);
-    gl.bindTexture(gl.TEXTURE_3D, sides[side].textures[0]);
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGBA8, w, h, d, 0, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
-    gl.activeTexture(gl.TEXTURE0 + 2 * side + 1);
-    gl.bindTexture(gl.TEXTURE_3D, sides[side].textures[1]);
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.R8, w, h, d, 0, gl.RED, gl.UNSIGNED_BYTE, shaded);
+    const { rgba, shaded, held } = await unpack(series, frame);
+    const size = page.series[series].dimensions;
+    [[rgba, gl.RGBA8, gl.RGBA, size], [shaded, gl.R8, gl.RED, size], [held, gl.R8, gl.RED, blocks(size)]].forEach(([bytes, inner, outer, [w, h, d]], kind) => {
+      gl.activeTexture(gl.TEXTURE0 + 3 * side + kind);
+      gl.bindTexture(gl.TEXTURE_3D, sides[side].textures[kind]);
+      gl.texImage3D(gl.TEXTURE_3D, 0, inner, w, h, d, 0, outer, gl.UNSIGNED_BYTE, bytes);
+    });
     sides[side].holds = key;
   }
 
