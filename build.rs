@@ -7,7 +7,8 @@ use std::process::Command;
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=.cargo_vcs_info.json");
-    let commit = packaged().or_else(|| if std::env::var("PROFILE").as_deref() == Ok("release") { checked_out() } else { None });
+    let commit =
+        packaged().or_else(|| if std::env::var("PROFILE").as_deref() == Ok("release") { checked_out() } else { None });
     if let Some(commit) = commit {
         println!("cargo:rustc-env=AO4D_COMMIT={commit}");
     }

@@ -142,7 +142,9 @@ impl Console {
     /// A message on stderr.
     fn say(&self, kind: &str, text: &str) {
         match (self.form(), kind) {
-            (Form::Json, _) => self.event(&json!({ "event": if kind.is_empty() { "detail" } else { kind }, "message": text })),
+            (Form::Json, _) => {
+                self.event(&json!({ "event": if kind.is_empty() { "detail" } else { kind }, "message": text }))
+            }
             (_, "") => to_stderr(text),
             _ => to_stderr(&format!("{kind}: {text}")),
         }

@@ -54,10 +54,8 @@ pub fn compare(a: &Path, b: &Path, tolerance: &Tolerance, progress: &dyn Progres
         let comparison = match (first.contains(file), second.contains(file)) {
             (true, false) => only("first"),
             (false, _) => only("second"),
-            (true, true) => two_files(&a.join(file), &b.join(file), tolerance).unwrap_or_else(|error| Comparison {
-                differences: vec![with_causes(&error)],
-                ..Comparison::default()
-            }),
+            (true, true) => two_files(&a.join(file), &b.join(file), tolerance)
+                .unwrap_or_else(|error| Comparison { differences: vec![with_causes(&error)], ..Comparison::default() }),
         };
         found.same &= comparison.same;
         found.files.push(FileComparison { file: file.clone(), comparison });
@@ -190,7 +188,11 @@ impl fmt::Display for Folders {
                 writeln!(f, "same: {}", file.display())?;
             } else {
                 writeln!(f, "different: {}", file.display())?;
-                comparison.to_string().lines().filter(|line| *line != "different").try_for_each(|l| writeln!(f, "  {l}"))?;
+                comparison
+                    .to_string()
+                    .lines()
+                    .filter(|line| *line != "different")
+                    .try_for_each(|l| writeln!(f, "  {l}"))?;
             }
         }
         match self.different() {

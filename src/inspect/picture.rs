@@ -40,19 +40,15 @@ pub fn write(a: &Path, b: &Path, tolerance: &Tolerance, into: &Path) -> Result<b
     let Some((x, y)) = most_different(&a, &b, tolerance) else { return Ok(false) };
     let range = range(x).into_iter().chain(range(y));
     let (low, high) = range.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    let rows = [
-        slices(&a.grid, |i| shown(x, i, low, high))?,
-        slices(&a.grid, |i| shown(y, i, low, high))?,
-        {
-            let limits = tolerance.of(&x.name);
-            let largest = (0..a.grid.len()).map(|i| difference(x, y, i).0).filter(|d| d.is_finite()).fold(0.0, f64::max);
-            slices(&a.grid, |i| {
-                let (d, reference) = difference(x, y, i);
-                let within = d <= limits.atol + limits.rtol * reference.abs();
-                heat(d, largest, within)
-            })?
-        },
-    ];
+    let rows = [slices(&a.grid, |i| shown(x, i, low, high))?, slices(&a.grid, |i| shown(y, i, low, high))?, {
+        let limits = tolerance.of(&x.name);
+        let largest = (0..a.grid.len()).map(|i| difference(x, y, i).0).filter(|d| d.is_finite()).fold(0.0, f64::max);
+        slices(&a.grid, |i| {
+            let (d, reference) = difference(x, y, i);
+            let within = d <= limits.atol + limits.rtol * reference.abs();
+            heat(d, largest, within)
+        })?
+    }];
     let mut file = AtomicFile::create(into)?;
     png::write(&mut file, &[&rows[0], &rows[1], &rows[2]]).map_err(AtomicFile::name_in(into))?;
     file.commit()?;
@@ -66,7 +62,9 @@ fn most_different<'i>(a: &'i Image, b: &'i Image, tolerance: &Tolerance) -> Opti
     let takes = |(x, _): &(&Array, &Array)| tolerance.takes(&x.name) && x.values.len() == a.grid.len() * x.components;
     let count = |(x, y): &(&Array, &Array)| {
         let limits = tolerance.of(&x.name);
-        (0..x.values.len()).filter(|&i| !limits.agree((x.values.get(i) - y.values.get(i)).abs(), y.values.get(i))).count()
+        (0..x.values.len())
+            .filter(|&i| !limits.agree((x.values.get(i) - y.values.get(i)).abs(), y.values.get(i)))
+            .count()
     };
     let counted = both.filter(fits).filter(takes).map(|pair| (count(&pair), pair)).filter(|(count, _)| *count > 0);
     counted.max_by_key(|(count, _)| *count).map(|(_, pair)| pair)

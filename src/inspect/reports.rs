@@ -11,7 +11,8 @@ impl Folders {
         let (all, failed) = (self.files.len(), self.different());
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
         let _ = writeln!(text, "<testsuites tests=\"{all}\" failures=\"{failed}\">");
-        let _ = writeln!(text, "  <testsuite name=\"ao4d compare\" tests=\"{all}\" failures=\"{failed}\" errors=\"0\">");
+        let _ =
+            writeln!(text, "  <testsuite name=\"ao4d compare\" tests=\"{all}\" failures=\"{failed}\" errors=\"0\">");
         for FileComparison { file, comparison } in &self.files {
             let name = xml_escaped(&file.to_string_lossy());
             if comparison.same {
@@ -21,7 +22,8 @@ impl Folders {
             let told = comparison.to_string();
             let first = told.lines().next().unwrap_or_default().trim_start_matches("different: ");
             let _ = writeln!(text, "    <testcase classname=\"ao4d.compare\" name=\"{name}\">");
-            let _ = writeln!(text, "      <failure message=\"{}\">{}</failure>", xml_escaped(first), xml_escaped(&told));
+            let _ =
+                writeln!(text, "      <failure message=\"{}\">{}</failure>", xml_escaped(first), xml_escaped(&told));
             text += "    </testcase>\n";
         }
         text + "  </testsuite>\n</testsuites>\n"

@@ -38,7 +38,9 @@ pub(super) fn include(
     let Value::Map(entries) = &mut root.value else { return Ok(()) };
     let Some(at) = entries.iter().position(|e| e.key == "include") else {
         return match entries.iter_mut().find(|e| e.key == "stages") {
-            Some(Entry { value, .. }) => include_stages(value, folder, above, read).map_err(|p| p.inside(key("stages"))),
+            Some(Entry { value, .. }) => {
+                include_stages(value, folder, above, read).map_err(|p| p.inside(key("stages")))
+            }
             None => Ok(()),
         };
     };
@@ -222,7 +224,8 @@ fn size(value: &Value) -> usize {
 /// What a text with dollar signs stands for.
 fn in_text(text: &str, known: &[Entry]) -> Result<Value, String> {
     let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
-    let whole = text.strip_prefix('$').map(|name| name.strip_prefix('{').map_or(name, |n| n.strip_suffix('}').unwrap_or(n)));
+    let whole =
+        text.strip_prefix('$').map(|name| name.strip_prefix('{').map_or(name, |n| n.strip_suffix('}').unwrap_or(n)));
     if let Some(name) = whole.filter(|name| !name.is_empty() && name.chars().all(plain)) {
         return Ok(find(name, known)?.value.clone());
     }
@@ -274,7 +277,10 @@ pub(super) fn sweep(root: &mut Node) -> Result<Option<Vec<Swept>>, Problem> {
         Value::Map(keys) if !keys.is_empty() => keys,
         other => {
             let found = yaml::describe(&other);
-            return Err(refuse(format!("expected keys with lists such as {{occlusion.samples: [16, 64]}}, found {found}"), origin));
+            return Err(refuse(
+                format!("expected keys with lists such as {{occlusion.samples: [16, 64]}}, found {found}"),
+                origin,
+            ));
         }
     };
     let mut all = vec![Swept::default()];
@@ -299,7 +305,10 @@ pub(super) fn sweep(root: &mut Node) -> Result<Option<Vec<Swept>>, Problem> {
     }
     let mut seen = std::collections::BTreeSet::new();
     if let Some(twice) = all.iter().find(|swept| !seen.insert(swept.suffix.clone())) {
-        return Err(refuse(format!("two pipelines of it would be called NAME{}; give different values", twice.suffix), origin));
+        return Err(refuse(
+            format!("two pipelines of it would be called NAME{}; give different values", twice.suffix),
+            origin,
+        ));
     }
     Ok(Some(all))
 }
@@ -352,12 +361,22 @@ mod tests {
             ("lib/more.yaml", "[{occlusion: 5}]"),
         ];
         for (text, expected) in [
-            ("include: lib/scene.yaml\nname: a\nvariables: {n: 7}\nstages: [{render: $m}]\n",
-             r#"{"name":"a","stages":[{"scene":7},{"occlusion":5},{"render":2}]}"#),
-            ("name: a\nstages: [{x: 1}, {include: lib/more.yaml}, {y: 2}]", r#"{"name":"a","stages":[{"x":1},{"occlusion":5},{"y":2}]}"#),
-            ("x-note: hi\nvariables: {a: [1, 2], b: \"q${c}\"}\n", "variables.b: no variable is called `c` (write `$$` for a dollar sign) (known: a)"),
-            ("x-note: hi\nvariables: {a: [1, 2], c: 3, b: \"q${c}\"}\nl: $a\nt: \"${b}-$$-$5\"\nm: {x-own: 1, k: true}\n",
-             r#"{"l":[1,2],"t":"q3-$-$5","m":{"k":true}}"#),
+            (
+                "include: lib/scene.yaml\nname: a\nvariables: {n: 7}\nstages: [{render: $m}]\n",
+                r#"{"name":"a","stages":[{"scene":7},{"occlusion":5},{"render":2}]}"#,
+            ),
+            (
+                "name: a\nstages: [{x: 1}, {include: lib/more.yaml}, {y: 2}]",
+                r#"{"name":"a","stages":[{"x":1},{"occlusion":5},{"y":2}]}"#,
+            ),
+            (
+                "x-note: hi\nvariables: {a: [1, 2], b: \"q${c}\"}\n",
+                "variables.b: no variable is called `c` (write `$$` for a dollar sign) (known: a)",
+            ),
+            (
+                "x-note: hi\nvariables: {a: [1, 2], c: 3, b: \"q${c}\"}\nl: $a\nt: \"${b}-$$-$5\"\nm: {x-own: 1, k: true}\n",
+                r#"{"l":[1,2],"t":"q3-$-$5","m":{"k":true}}"#,
+            ),
             ("variables: {a: [1]}\nt: \"s${a}\"\n", "t: `a` is a list of 1, which can't stand within a text"),
             ("include: lib/none.yaml\n", "include: lib/none.yaml isn't there"),
             ("include: [3]\n", "include[0]: expected the name of a file, found the number 3"),

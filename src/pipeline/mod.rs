@@ -16,8 +16,10 @@ mod compose;
 mod document;
 mod error;
 mod guard;
+mod launcher;
 mod lock;
 pub mod overrides;
+mod pieces;
 mod pool;
 mod provenance;
 mod report;
@@ -35,14 +37,16 @@ use crate::progress::{Progress, Silent};
 use crate::stages::fit::Fitted;
 use crate::stages::prepare::Prepared;
 use crate::stages::write::PROGRAM;
-use crate::stages::{Invalid, Plan, suggest};
+use crate::stages::{Invalid, Piece, Plan, suggest};
 
 pub use crate::stages::suggest::unknown as unknown_word;
 pub use document::{Document, STDIN};
 pub use error::{Error, Place, Refusal};
+pub use launcher::Launched;
+pub use pieces::PiecesError;
 pub use provenance::Told;
 pub use report::{FileReport, Report, StageTime};
-pub use run::{RunError, run, run_sharing};
+pub use run::{RunError, merge, run, run_sharing};
 pub use schema::schema;
 pub use settings::{Backend, BackendError, Settings};
 pub use share::Shared;
@@ -73,11 +77,16 @@ impl Pipeline {
     /// Whatever is wrong with one.
     pub fn swept(document: Document, overrides: &[String], out: Option<PathBuf>) -> Result<Vec<Self>, Error> {
         let place = |document: &Document| {
-            let inner = |out: &PathBuf| if document.swept().is_empty() { out.clone() } else { out.join(document.swept()) };
+            let inner =
+                |out: &PathBuf| if document.swept().is_empty() { out.clone() } else { out.join(document.swept()) };
             out.as_ref().map(inner)
         };
         let documents = Self::documents(document, overrides)?;
-        documents.into_iter().map(|document| (place(&document), document)).map(|(out, d)| Self::resolve(d, out)).collect()
+        documents
+            .into_iter()
+            .map(|document| (place(&document), document))
+            .map(|(out, d)| Self::resolve(d, out))
+            .collect()
     }
 
     /// A document with overrides, and all the pipelines that it stands for.
@@ -145,6 +154,11 @@ impl Pipeline {
         guard::check(self)?;
         provenance::check(self)?;
         self.plan.prepare(wanted, progress).map_err(|invalid| self.document.refuse(invalid))
+    }
+
+    /// The same pipeline for a piece of its run, which works in a folder of its own.
+    pub fn in_piece(&self, piece: Piece) -> Self {
+        Self { plan: self.plan.in_piece(piece), ..self.clone() }
     }
 
     /// What is allowed but probably not meant, each with its place.

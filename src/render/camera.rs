@@ -258,6 +258,12 @@ impl<const D: usize> Camera<D> {
         std::array::from_fn(|axis| all[axis])
     }
 
+    /// The direction that has these parts along the axes of the camera's frame.
+    pub(super) fn from_frame(&self, parts: &Vector<D>) -> Vector<D> {
+        let axes = self.axes();
+        narrow(&(0..D).fold(Vector64::zeros(), |sum, r| sum + axes[r] * f64::from(parts[r])))
+    }
+
     /// Whether rays are parallel.
     pub(super) fn is_parallel(&self) -> bool {
         matches!(self.projection, Projection::Parallel { .. })

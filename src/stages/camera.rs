@@ -149,7 +149,17 @@ impl CameraPlan {
         };
         let [eye, target, up] = [&self.eye, &self.target, &self.up].map(|v| Some(v.clone()));
         let over = self.over.clone();
-        CameraSpec { projection: Some(projection), eye, target, field_of_view, height, up, over, fit: None, margin: None }
+        CameraSpec {
+            projection: Some(projection),
+            eye,
+            target,
+            field_of_view,
+            height,
+            up,
+            over,
+            fit: None,
+            margin: None,
+        }
     }
 
     /// As it is written in a pipeline, nothing left out.

@@ -86,7 +86,9 @@ struct Image {
 /// The camera from which the points fit the image.
 fn fitted<const D: usize>(asked: &CameraPlan, points: &[Vector64<D>], image: &Image) -> Result<CameraPlan, String> {
     if points.is_empty() {
-        return Err("there is nothing in the scene that could fit the image; add an object, or say where the eye is".into());
+        return Err(
+            "there is nothing in the scene that could fit the image; add an object, or say where the eye is".into()
+        );
     }
     // Its own frame may be had without knowing where it is.
     let frame = camera::camera::<D>(asked).map_err(|e| e.to_string())?.axes();
@@ -96,7 +98,10 @@ fn fitted<const D: usize>(asked: &CameraPlan, points: &[Vector64<D>], image: &Im
         along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
     };
     let ranges: Vec<[f64; 2]> = across.iter().map(range).collect();
-    let [near, far] = { let [low, high] = range(back); [high, low] };
+    let [near, far] = {
+        let [low, high] = range(back);
+        [high, low]
+    };
     let middle: Vec<f64> = ranges.iter().map(|[low, high]| 0.5 * (low + high)).collect();
     let depth = 0.5 * (near + far);
     let centre = compose(&frame, &middle, depth);

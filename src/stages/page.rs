@@ -15,9 +15,9 @@ use super::render::RenderPlan;
 use super::scene::ScenePlan;
 use super::write::{Format, PROGRAM, WritePlan};
 use super::{Invalid, Keys, LeftOut, OneOrMany, Output, Plan, Ref, Resolver, Run, Stage, StageError};
+use crate::io::AtomicFile;
 use crate::io::page::{self, Palette, Series, Voxels};
 use crate::io::vtk::{self, DataSet, Image};
-use crate::io::AtomicFile;
 use crate::occlusion::Cancelled;
 use crate::render::Aov;
 use crate::text::number;
@@ -103,6 +103,9 @@ impl Stage for PagePlan {
 
     fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
         let (plan, page) = (run.plan, &run.plan[me]);
+        if plan.piece.is_some() {
+            return Ok("made when the pieces are joined".to_owned());
+        }
         if !run.is_stale(&page.file) {
             return Ok("as it was".to_owned());
         }
@@ -133,7 +136,10 @@ fn shown(spec: &PageSpec, path: &str, resolver: &Resolver) -> Result<Vec<Shown>,
         // Animations first: a page is opened to turn something.
         let all: Vec<Shown> = animations.chain(writes).filter(|&s| !plan.is_twin(s.index()) && fits(s)).collect();
         return match all.is_empty() {
-            true => Err(Invalid::new(path, "there is no earlier `animate`, and no `write` with `vti`, to show; put one first")),
+            true => Err(Invalid::new(
+                path,
+                "there is no earlier `animate`, and no `write` with `vti`, to show; put one first",
+            )),
             false => Ok(all),
         };
     };
@@ -143,9 +149,9 @@ fn shown(spec: &PageSpec, path: &str, resolver: &Resolver) -> Result<Vec<Shown>,
         let stage = resolver.lookup(&at, id, &[RenderPlan::KIND, WritePlan::KIND, AnimatePlan::KIND])?;
         let found = match (plan.reference(stage), plan.reference::<RenderPlan>(stage)) {
             (Some(animation), _) => Some(Shown::Animation(animation)),
-            (_, Some(render)) => {
-                resolver.nearest(|write: Ref<WritePlan>| plan[write].render == render && has_file(write)).map(Shown::Image)
-            }
+            (_, Some(render)) => resolver
+                .nearest(|write: Ref<WritePlan>| plan[write].render == render && has_file(write))
+                .map(Shown::Image),
             _ => plan.reference(stage).filter(|&write| has_file(write)).map(Shown::Image),
         };
         let Some(found) = found else {
@@ -168,6 +174,7 @@ fn name(shown: Shown, plan: &Plan) -> &str {
     match shown {
         Shown::Image(write) => plan.id(plan[write].render),
         Shown::Animation(animation) => plan.id(animation),
+        Shown::Wireframe(_) | Shown::Slice(_) => "",
     }
 }
 
@@ -179,8 +186,15 @@ fn files(shown: Shown, plan: &Plan) -> Vec<(PathBuf, String)> {
         }
         Shown::Animation(animation) => {
             let animation = &plan[animation];
-            animation.files.iter().enumerate().map(|(i, file)| (file.clone(), moment(&animation.motion(i), i))).collect()
+            animation
+                .files
+                .iter()
+                .enumerate()
+                .map(|(i, file)| (file.clone(), moment(&animation.motion(i), i)))
+                .collect()
         }
+        // Lines and surfaces are no volumes, and `shown` takes none.
+        Shown::Wireframe(_) | Shown::Slice(_) => Vec::new(),
     }
 }
 
@@ -196,8 +210,9 @@ fn moment(motion: &Motion, i: usize) -> String {
 /// Reads a picture's files, and packs their voxels.
 fn series(shown: Shown, run: &Run) -> Result<Series, StageError> {
     let plan = run.plan;
-    let render = &plan[shown.render(plan)];
-    let separable = render.lighting.is_none() && render.is_dark() && shown.arrays(plan).contains(&Aov::AmbientOcclusion);
+    let has_occlusion = shown.arrays(plan).contains(&Aov::AmbientOcclusion);
+    let plain = |render: Ref<RenderPlan>| plan[render].lighting.is_none() && plan[render].is_dark();
+    let separable = shown.render(plan).is_some_and(plain) && has_occlusion;
     let files = files(shown, plan);
     let step = || {
         run.progress.advance(1);
@@ -218,7 +233,8 @@ fn series(shown: Shown, run: &Run) -> Result<Series, StageError> {
     for (file, called) in files {
         let path = plan.out.join(&file);
         let image = read(&path)?;
-        let voxels = Frame::new(&image, separable).filter(|_| Some(image.grid.dimensions) == grid.map(|g| g.dimensions));
+        let voxels =
+            Frame::new(&image, separable).filter(|_| Some(image.grid.dimensions) == grid.map(|g| g.dimensions));
         let voxels = voxels.ok_or_else(|| damaged(&path))?;
         frames.push((called, palette.pack(&voxels.of(&image)).map_err(AtomicFile::name_in(&path))?));
         step()?;

@@ -10,7 +10,19 @@ fn help_texts() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
     let bless = std::env::var_os("AO4D_BLESS").is_some();
     let verbs = [
-        "", "run", "check", "study", "compare", "info", "devices", "schema", "page", "example", "completions", "man",
+        "",
+        "run",
+        "check",
+        "study",
+        "compare",
+        "info",
+        "devices",
+        "schema",
+        "page",
+        "example",
+        "completions",
+        "man",
+        "merge",
     ];
     for verb in verbs {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ao4d"));
@@ -38,7 +50,8 @@ fn ao4d(arguments: &[&str]) -> (Option<i32>, String, String) {
 #[test]
 fn shells_and_manuals_know_every_verb_and_option() {
     let (_, help, _) = ao4d(&["help"]);
-    let verbs: Vec<&str> = help.lines().skip_while(|l| *l != "Commands:").skip(1).map_while(|l| l.split_whitespace().next()).collect();
+    let verbs: Vec<&str> =
+        help.lines().skip_while(|l| *l != "Commands:").skip(1).map_while(|l| l.split_whitespace().next()).collect();
     assert!(verbs.contains(&"run") && verbs.contains(&"completions"), "{help}");
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let (code, text, told) = ao4d(&["completions", shell]);
@@ -81,7 +94,9 @@ fn examples_are_written_with_what_they_read() {
     let path = folder.path().join("lessons/08_ant.yaml");
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(text.starts_with("# yaml-language-server: $schema=../ao4d.schema.json\n"), "{text}");
-    assert!(folder.path().join("ao4d.schema.json").is_file() && folder.path().join("meshes/LICENSE-pyvista.txt").is_file());
+    assert!(
+        folder.path().join("ao4d.schema.json").is_file() && folder.path().join("meshes/LICENSE-pyvista.txt").is_file()
+    );
     assert!(!folder.path().join("data").exists());
     let (code, _, told) = ao4d(&["check", path.to_str().unwrap()]);
     assert_eq!(code, Some(0), "{told}");

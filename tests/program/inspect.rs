@@ -187,7 +187,10 @@ fn folders_are_compared_file_by_file_and_reported() {
     assert_eq!(folder.says(&["compare", "new", "old/a.vti"]).0, 2);
     // A file of its own may have tolerances and reports as well.
     folder.write("t.yaml", b"arrays: {ambient_occlusion: {atol: 0.125}}\n");
-    assert_eq!(folder.says(&["compare", "new/a.vti", "old/a.vti", "--tolerances", "t.yaml", "--junit", "j.xml", "-q"]).0, 0);
+    assert_eq!(
+        folder.says(&["compare", "new/a.vti", "old/a.vti", "--tolerances", "t.yaml", "--junit", "j.xml", "-q"]).0,
+        0
+    );
     assert!(read("j.xml").contains("failures=\"0\""));
 }
 

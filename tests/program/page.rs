@@ -39,7 +39,8 @@ fn browser() -> Command {
 /// The page in a folder of its own.
 fn page(folder: &Path) -> PathBuf {
     std::fs::write(folder.join("p.yaml"), PIPELINE).unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_ao4d")).current_dir(folder).args(["page", "p.yaml"]).output().unwrap();
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_ao4d")).current_dir(folder).args(["page", "p.yaml"]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     folder.join("out/cubes/page.html")
 }
@@ -53,7 +54,8 @@ fn seen(folder: &Path, page: &Path, state: &str) -> (Vec<[u8; 3]>, usize) {
     let output = command.output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!told.contains("CONSOLE"), "the page complains:\n{told}");
-    let mut reader = png::Decoder::new(BufReader::new(std::fs::File::open(&picture).expect(&told))).read_info().unwrap();
+    let mut reader =
+        png::Decoder::new(BufReader::new(std::fs::File::open(&picture).expect(&told))).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
     let info = reader.next_frame(&mut bytes).unwrap();
     let samples = info.color_type.samples();
@@ -105,7 +107,9 @@ fn frames_follow_each_other() {
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let (send, lines) = mpsc::channel();
     let stderr = child.stderr.take().unwrap();
-    std::thread::spawn(move || BufReader::new(stderr).lines().map_while(Result::ok).try_for_each(|line| send.send(line)));
+    std::thread::spawn(move || {
+        BufReader::new(stderr).lines().map_while(Result::ok).try_for_each(|line| send.send(line))
+    });
     let (began, mut measured) = (Instant::now(), None);
     while let (None, Some(left)) = (&measured, PATIENCE.checked_sub(began.elapsed())) {
         let Ok(line) = lines.recv_timeout(left) else { break };
@@ -118,6 +122,9 @@ fn frames_follow_each_other() {
     let told = measured.expect("the page tells how long its frames take");
     let json: Value = serde_json::from_str(&told[..=told.rfind('}').unwrap()]).unwrap();
     let [draw, frame] = ["draw", "frame"].map(|key| json[key].as_f64().unwrap());
-    println!("a view takes {draw:.0} ms, another frame {frame:.0} ms, of {} x {} pixels", json["width"], json["height"]);
+    println!(
+        "a view takes {draw:.0} ms, another frame {frame:.0} ms, of {} x {} pixels",
+        json["width"], json["height"]
+    );
     assert!(draw > 0.0 && frame > 0.0);
 }

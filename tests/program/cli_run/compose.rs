@@ -51,9 +51,27 @@ fn a_sweep_runs_all_combinations_and_shares_what_it_can() {
     let events: Vec<Value> = told.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let traced = events.iter().filter(|e| e["event"] == "begin" && e["stage"] == "occlusion ao").count();
     assert_eq!(traced, 2, "{told}");
-    assert!(events.iter().all(|e| e["event"].is_string()) && events.iter().any(|e| e["event"] == "end" && e["seconds"].is_f64()));
+    assert!(
+        events.iter().all(|e| e["event"].is_string())
+            && events.iter().any(|e| e["event"] == "end" && e["seconds"].is_f64())
+    );
     // What is shared is what would have been made alone.
-    let alone = says(&folder, &["run", "p.yaml", "--set", "sweep=", "--set", "ao.samples=8", "--set", "render.camera.margin=0.3", "--out", "alone"], "");
+    let alone = says(
+        &folder,
+        &[
+            "run",
+            "p.yaml",
+            "--set",
+            "sweep=",
+            "--set",
+            "ao.samples=8",
+            "--set",
+            "render.camera.margin=0.3",
+            "--out",
+            "alone",
+        ],
+        "",
+    );
     assert_eq!(alone.0, Some(0), "{}", alone.2);
     for file in ["ao.f32", "ao.error.f32"] {
         let of = |out: &str| std::fs::read(folder.path(&format!("{out}/{file}"))).unwrap();
@@ -64,7 +82,13 @@ fn a_sweep_runs_all_combinations_and_shares_what_it_can() {
     // All is cached; what a file tells is one pipeline, whole.
     let (_, text, _) = says(&folder, &["run", "p.yaml", "--json"], "");
     let json: Value = serde_json::from_str(&text).unwrap();
-    assert!(json["pipelines"].as_array().unwrap().iter().all(|r| r["files"].as_array().unwrap().iter().all(|f| f["cached"] == true)));
+    assert!(
+        json["pipelines"].as_array().unwrap().iter().all(|r| r["files"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|f| f["cached"] == true))
+    );
     let (_, text, _) = says(&folder, &["info", "--pipeline", "alone/a.vti"], "");
     assert!(text.contains("tesseract: {size: 40}") && text.contains("samples: 8") && !text.contains("sweep"), "{text}");
     assert!(text.contains("eye: [300") && !text.contains("fit"), "{text}");
@@ -113,7 +137,10 @@ fn complaints_name_the_file_that_is_included() {
     std::fs::write(folder.path("parts/scene.yaml"), SCENE.replace("tesseract:", "teseract:")).unwrap();
     let (code, _, told) = says(&folder, &["check", "p.yaml"], "");
     assert_eq!(code, Some(2));
-    assert!(told.starts_with("error: parts/scene.yaml:3:38: stages[0].scene.objects[0].teseract: unknown key"), "{told}");
+    assert!(
+        told.starts_with("error: parts/scene.yaml:3:38: stages[0].scene.objects[0].teseract: unknown key"),
+        "{told}"
+    );
     std::fs::write(folder.path("parts/scene.yaml"), "stages: [1\n").unwrap();
     let (_, _, told) = says(&folder, &["check", "p.yaml"], "");
     assert!(told.starts_with("error: parts/scene.yaml:") && told.contains("is not YAML"), "{told}");
@@ -123,8 +150,10 @@ fn complaints_name_the_file_that_is_included() {
 
 #[test]
 fn what_is_said_depends_on_the_level() {
-    let folder = Folder::with(&PIPELINE.replace("name: small", "name: small\nseed: 1").replace("seed: 1\nseed: 1", "seed: 1"));
-    let told = |level: &str| says(&folder, &["check", "p.yaml", "--log-level", level, "--set", "image.camera.height=3"], "").2;
+    let folder =
+        Folder::with(&PIPELINE.replace("name: small", "name: small\nseed: 1").replace("seed: 1\nseed: 1", "seed: 1"));
+    let told =
+        |level: &str| says(&folder, &["check", "p.yaml", "--log-level", level, "--set", "image.camera.height=3"], "").2;
     assert!(told("warn").starts_with("warning: ") && told("warn").contains("has no use"));
     assert_eq!(told("error"), "");
     assert!(told("debug").contains(" s\n"));
@@ -134,7 +163,8 @@ fn what_is_said_depends_on_the_level() {
 
 #[test]
 fn a_page_holds_what_the_pipeline_shows() {
-    let pipeline = format!("{PIPELINE}  - animate: {{id: turn, input: image, frames: 3, turn: {{plane: xw}}, vti: turn.vti}}\n");
+    let pipeline =
+        format!("{PIPELINE}  - animate: {{id: turn, input: image, frames: 3, turn: {{plane: xw}}, vti: turn.vti}}\n");
     let folder = Folder::with(&pipeline);
     let (code, _, told) = says(&folder, &["page", "p.yaml"], "");
     assert_eq!(code, Some(0), "{told}");
