@@ -14,7 +14,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::yaml::{self, Entry, Node, Origin, Problem, Segment, Value, shorten};
+use super::yaml::{self, Entry, MAX_DEPTH, Node, Origin, Problem, Segment, Value, shorten};
 use crate::stages::suggest;
 
 /// Files within files within files: more than this is a mistake.
@@ -22,7 +22,7 @@ const MAX_INCLUDES: usize = 16;
 /// The most pipelines that a sweep makes.
 const MAX_SWEPT: usize = 10_000;
 /// Values that a pipeline's text may grow to by its variables.
-const MAX_VALUES: usize = 1_000_000;
+const MAX_VALUES: usize = 200_000;
 
 /// Reads an included file: its path, and where it is asked for.
 pub(super) type Read<'r> = dyn FnMut(&Path) -> Result<Node, String> + 'r;
@@ -50,6 +50,8 @@ pub(super) fn include(
     let mut first = Vec::new();
     for (i, name) in names.iter().enumerate() {
         let place = |p: Problem| match &asked.value {
+            // Within that file it has a path of its own.
+            _ if !p.path().is_empty() => p,
             Value::List(_) => p.inside(Segment::Index(i)).inside(key("include")),
             _ => p.inside(key("include")),
         };
@@ -103,7 +105,10 @@ fn include_stages(stages: &mut Node, folder: &Path, above: &mut Vec<PathBuf>, re
             all.push(item);
             continue;
         };
-        let place = |p: Problem| p.inside(key("include")).inside(Segment::Index(i));
+        let place = |p: Problem| match p.path().is_empty() {
+            true => p.inside(key("include")).inside(Segment::Index(i)),
+            false => p,
+        };
         let other = open(name, folder, above, read).map_err(place)?;
         let theirs = match other.value {
             Value::List(stages) => Some(stages),
@@ -168,12 +173,32 @@ pub(super) fn substitute(root: &mut Node) -> Result<(), Problem> {
     let Value::Map(entries) = &mut root.value else { return Ok(()) };
     let Some(at) = entries.iter().position(|entry| entry.key == "variables") else { return Ok(()) };
     let Entry { value: given, .. } = entries.remove(at);
+    let mut left = MAX_VALUES;
+    let known = variables(given, &mut left)?;
+    replace(root, &known, &mut left)?;
+    check_depth(root, MAX_DEPTH + 2)
+}
+
+/// Refuses what became deeper than a text may be, by lists of variables in lists of variables.
+fn check_depth(node: &Node, left: usize) -> Result<(), Problem> {
+    let Some(left) = left.checked_sub(1) else {
+        let message = format!("lists and mappings are more than {MAX_DEPTH} deep, with variables in their places");
+        return Err(Problem::new(message).or_at(node.origin));
+    };
+    match &node.value {
+        Value::List(items) => items.iter().try_for_each(|item| check_depth(item, left)),
+        Value::Map(entries) => entries.iter().try_for_each(|entry| check_depth(&entry.value, left)),
+        _ => Ok(()),
+    }
+}
+
+/// The variables of a pipeline, each with those before it in its value.
+fn variables(given: Node, left: &mut usize) -> Result<Vec<Entry>, Problem> {
     let Value::Map(given) = given.value else {
         let message = format!("expected a mapping such as {{rays: 64}}, found {}", yaml::describe(&given.value));
         return Err(Problem::new(message).or_at(given.origin).inside(key("variables")));
     };
     let mut known: Vec<Entry> = Vec::new();
-    let mut left = MAX_VALUES;
     // Each may use those before it.
     for mut entry in given {
         let plain = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
@@ -182,10 +207,11 @@ pub(super) fn substitute(root: &mut Node) -> Result<(), Problem> {
             return Err(Problem::new(message).or_at(entry.origin).inside(key(&entry.key)).inside(key("variables")));
         }
         let placed = |p: Problem| p.inside(key(&entry.key)).inside(key("variables"));
-        replace(&mut entry.value, &known, &mut left).map_err(placed)?;
+        replace(&mut entry.value, &known, left).map_err(placed)?;
+        check_depth(&entry.value, MAX_DEPTH).map_err(placed)?;
         known.push(entry);
     }
-    replace(root, &known, &mut left)
+    Ok(known)
 }
 
 /// Recursion is bounded by the depth of trees.
@@ -271,7 +297,12 @@ pub(super) struct Swept {
 pub(super) fn sweep(root: &mut Node) -> Result<Option<Vec<Swept>>, Problem> {
     let Value::Map(entries) = &mut root.value else { return Ok(None) };
     let Some(at) = entries.iter().position(|entry| entry.key == "sweep") else { return Ok(None) };
-    let Entry { value: asked, origin, .. } = entries.remove(at);
+    let Entry { value: mut asked, origin, .. } = entries.remove(at);
+    if let Some(Entry { value: given, .. }) = entries.iter().find(|entry| entry.key == "variables") {
+        let mut left = MAX_VALUES;
+        let known = variables(given.clone(), &mut left)?;
+        replace(&mut asked, &known, &mut left).map_err(|p| p.inside(key("sweep")))?;
+    }
     let refuse = |message: String, origin: Origin| Problem::new(message).or_at(origin).inside(key("sweep"));
     let keys = match asked.value {
         Value::Map(keys) if !keys.is_empty() => keys,
@@ -394,7 +425,7 @@ mod tests {
         for i in 1..9 {
             text += &format!("  v{i}: [{}]\n", vec![format!("$v{}", i - 1); 10].join(", "));
         }
-        assert!(composed(&(text + "a: $v8\n"), &[]).unwrap_err().contains("more than 1000000 values"));
+        assert!(composed(&(text + "a: $v8\n"), &[]).unwrap_err().contains("more than 200000 values"));
     }
 
     #[test]

@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// Two bodies of two colours: one cube before the other's corner, so that an octant cuts both.
+/// Two bodies of two colours, the taller of which darkens the other's top.
 const PIPELINE: &str = "name: cubes
 stages:
   - scene:
       objects:
         - {name: red, color: [0.9, 0.1, 0.1], box: {min: [-0.8, -0.5, -0.5, -0.3], max: [-0.05, 0.5, 0.5, 0.3]}}
-        - {name: blue, color: [0.1, 0.2, 0.9], box: {min: [0.05, -0.5, -0.5, -0.3], max: [0.8, 0.5, 0.5, 0.3]}}
+        - {name: blue, color: [0.1, 0.2, 0.9], box: {min: [0.05, -0.5, -0.5, -0.3], max: [0.8, 0.9, 0.5, 0.3]}}
   - occlusion: {samples: 16, file: ao.f32}
   - render: {id: both, camera: {fit: true, projection: parallel}, dimensions: [24, 24, 24], shading: smooth}
   - animate: {id: turn, frames: 4, turn: {plane: xw}, vti: turn.vti}
@@ -83,7 +83,7 @@ fn a_browser_shows_the_page() {
     assert!(count(&cut, 0) > 3000 && count(&cut, 2) < 200, "{} and {}", count(&cut, 0), count(&cut, 2));
     // A thin slice across y shows less of both.
     let slice = seen(folder.path(), &page, "series=1&cut=slice&axis=1");
-    assert!((200..red / 2).contains(&count(&slice, 0)), "{}", count(&slice, 0));
+    assert!((200..red).contains(&count(&slice, 0)), "{}", count(&slice, 0));
     // Without occlusion nothing is darker than the colours themselves.
     let dark = |seen: &(Vec<[u8; 3]>, usize)| {
         let rows = seen.0.chunks_exact(seen.1).skip(60);
