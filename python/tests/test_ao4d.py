@@ -217,7 +217,7 @@ def test_other_threads_run():
     ticker = threading.Thread(target=tick)
     ticker.start()
     began = time.monotonic()
-    ao4d.occlusion(mesh, samples=2048)
+    ao4d.occlusion(mesh, samples=768)
     took = time.monotonic() - began
     stop.set()
     ticker.join()
