@@ -91,8 +91,7 @@ fn warn(py: Python<'_>, pipeline: &Pipeline) -> PyResult<()> {
 /// Values at vertices, their standard errors, and how many rays that took.
 type Found<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, u64);
 /// A picture: dimensions, origin, spacing, arrays, how far off it is (RMS, the largest, of how many voxels), and notes.
-type Picture<'py> =
-    ([usize; 3], [f64; 3], [f64; 3], Vec<Named<'py>>, Option<(f64, f64, usize)>, Vec<String>);
+type Picture<'py> = ([usize; 3], [f64; 3], [f64; 3], Vec<Named<'py>>, Option<(f64, f64, usize)>, Vec<String>);
 
 /// Ambient occlusion at the vertices of a mesh, as the pipeline's occlusion says.
 #[pyfunction]

@@ -27,15 +27,8 @@ pub enum Any {
 pub struct Mesh(Any);
 
 /// One object: name, vertices, simplices, colour, opacity, crease angle (below 0: never), and the eye that it faces.
-type Object<'py> = (
-    String,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, u32>,
-    [f32; 3],
-    f32,
-    f64,
-    Option<Vec<f64>>,
-);
+type Object<'py> =
+    (String, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, u32>, [f32; 3], f32, f64, Option<Vec<f64>>);
 
 impl Mesh {
     /// What it is.
@@ -135,7 +128,8 @@ fn from_objects<const D: usize>(py: Python<'_>, objects: Vec<Object<'_>>) -> PyR
     for (name, vertices, simplices, color, opacity, crease, eye) in objects {
         for (what, columns) in [("vertices", vertices.shape()[1]), ("simplices", simplices.shape()[1])] {
             if columns != D {
-                let message = format!("{name}: {what} have {columns} columns; expected {D}, as the first object's vertices have");
+                let message =
+                    format!("{name}: {what} have {columns} columns; expected {D}, as the first object's vertices have");
                 return Err(PipelineError::new_err(message));
             }
         }

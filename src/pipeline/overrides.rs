@@ -226,10 +226,7 @@ stages:
                 "no stage and no key is called `oclusion`, did you mean `occlusion`? (known: ao, second, occlusion, render, name, seed, stages)",
             ),
             ("paraview=", "the pipeline has no `paraview` stage"),
-            (
-                "stages[+]=",
-                "write the stage that is to be added, for instance stages[+]={write: {png: a.png}}",
-            ),
+            ("stages[+]=", "write the stage that is to be added, for instance stages[+]={write: {png: a.png}}"),
             ("stages[3]=", "stages: the list has 3 items, so [3] is outside it"),
             ("paraview.state=a.py", "the pipeline has no `paraview` stage"),
             ("ao=3", "`ao` is a stage; name one of its keys: ao.KEY=3"),

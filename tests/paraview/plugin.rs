@@ -99,7 +99,9 @@ fn the_plugin_shows_what_the_program_makes() {
     }
     // An eye that a film turns by as much, twice as far away.
     run_with(
-        &["with.camera={eye: [-1, 0, 0, 1.7320508075688772], target: [0, 0, 0, 0], up: [0, 1, 0, 0], over: [0, 0, 1, 0]}"],
+        &[
+            "with.camera={eye: [-1, 0, 0, 1.7320508075688772], target: [0, 0, 0, 0], up: [0, 1, 0, 0], over: [0, 0, 1, 0]}",
+        ],
         &at("turned"),
     );
     let (ours, theirs) = (numbers(&found["turned"]["opacity"]), some(&at("turned/with.vti"), "opacity"));
@@ -107,8 +109,14 @@ fn the_plugin_shows_what_the_program_makes() {
     assert!(different * 100 <= ours.len(), "{different} of {}: rounding of the eye decides few voxels", ours.len());
     assert_ne!(ours, numbers(&picture["arrays"]["opacity"]));
     assert_eq!(numbers(&found["plain"]["dimensions"]), [0., 5., 0., 5., 0., 5.]);
-    let exact =
-        ["ao.method=exact", "ao.samples=", "with.supersample=1", "with.tolerance=0.05", "with.shading=smooth", "with.dilate=0"];
+    let exact = [
+        "ao.method=exact",
+        "ao.samples=",
+        "with.supersample=1",
+        "with.tolerance=0.05",
+        "with.shading=smooth",
+        "with.dilate=0",
+    ];
     run_with(&exact, &at("exact"));
     assert_eq!(numbers(&found["exact"]["ambient_occlusion"]), some(&at("exact/with.vti"), "ambient_occlusion"));
     // With known occlusion a turn is quicker than what computes it, and what is unchanged takes no time.
@@ -116,7 +124,10 @@ fn the_plugin_shows_what_the_program_makes() {
     assert!(seconds("again") < 0.05, "{}", found["times"]);
 
     let refused = found["refused"].as_str().unwrap();
-    assert!(refused.contains("shadin: unknown key, did you mean `shading`?") && !refused.contains("Traceback"), "{refused}");
+    assert!(
+        refused.contains("shadin: unknown key, did you mean `shading`?") && !refused.contains("Traceback"),
+        "{refused}"
+    );
     let missing = found["no program"].as_str().unwrap();
     assert!(missing.contains("there is no program /no/such/program"), "{missing}");
     let told = found["no array"].as_str().unwrap();

@@ -163,6 +163,15 @@ impl<const D: usize> Rays<D> {
         (0..BLOCK).fold(0, |word, i| word | (set >> i & 1) << (self.number[i] % BLOCK as u8))
     }
 
+    /// Tells the first `count` rays, in the sequence's order, to `watch`: where each goes, and whether it is in the set.
+    pub fn tell(&self, set: u64, count: usize, watch: &mut dyn FnMut(Vector<D>, bool)) {
+        let mut places = [0; BLOCK];
+        (0..count).for_each(|i| places[self.number[i] as usize % BLOCK] = i);
+        for &i in &places[..count] {
+            watch(Vector::from_fn(|k, _| self.direction[k][i]), set >> i & 1 == 1);
+        }
+    }
+
     /// Completes the directions by what box tests need. `origin` is in the coordinates of the boxes.
     #[inline(always)]
     pub fn start_from(&mut self, origin: &Vector<D>) {
