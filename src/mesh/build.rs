@@ -4,7 +4,9 @@ use rayon::prelude::*;
 
 use super::copies::Sides;
 use super::corners::{self, Corners};
-use super::{Copies, Crease, Gloss, Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding};
+use super::{
+    Copies, Crease, Gloss, Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding,
+};
 use crate::geometry::{Vector, is_degenerate, narrow};
 use crate::progress::{Progress, Silent};
 

@@ -427,11 +427,7 @@ impl Stage for RenderPlan {
 }
 
 /// Why nothing is known of the directions in which the sky is open, if so.
-fn no_directions(
-    plan: &Plan,
-    scene: Ref<ScenePlan>,
-    occlusion: Option<Ref<OcclusionPlan>>,
-) -> Option<String> {
+fn no_directions(plan: &Plan, scene: Ref<ScenePlan>, occlusion: Option<Ref<OcclusionPlan>>) -> Option<String> {
     if let Some(name) = plan[scene].translucent() {
         return Some(format!(
             "{name} lets light through, and where the sky is open is found among opaque objects only; leave out `opacity` \

@@ -145,7 +145,10 @@ impl Stage for ShadePlan {
             }
         }
         if arrays.is_empty() {
-            return Err(Invalid::new(format!("{path}.arrays"), "the list is empty; leave it out for `ambient_occlusion`"));
+            return Err(Invalid::new(
+                format!("{path}.arrays"),
+                "the list is empty; leave it out for `ambient_occlusion`",
+            ));
         }
         let bounce = lighting::bounce(spec.bounce, path)?;
         if let (false, Some(i)) = (bounce, arrays.iter().position(|&aov| aov == Aov::Bounce)) {
@@ -256,7 +259,8 @@ impl Stage for ShadePlan {
                 grouped(found.seen)
             ));
         }
-        let seen = format!("{} of {} points show something", grouped(found.seen), grouped(image.volume.grid.len() as u64));
+        let seen =
+            format!("{} of {} points show something", grouped(found.seen), grouped(image.volume.grid.len() as u64));
         let bytes = shade.write(&plan.out.join(&shade.file), run.told, image, found.arrays)?;
         run.made(&shade.file, bytes, notes)?;
         Ok(seen)

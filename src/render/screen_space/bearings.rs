@@ -89,7 +89,8 @@ mod tests {
             let start = g - FRAC_PI_2;
             let all = integral(start, |_| 1.0);
             for from in [start, -0.3, 0.0, 0.4, g + FRAC_PI_2] {
-                let side = if from < 0.0 { super::super::sectors::Side::Behind } else { super::super::sectors::Side::Ahead };
+                let side =
+                    if from < 0.0 { super::super::sectors::Side::Behind } else { super::super::sectors::Side::Ahead };
                 let mut hidden = Hidden::default();
                 hidden.hide(0.0, if from == start { 0.0 } else { slice.share(side, from.cos() as f32) }, 0.5);
                 let found = bearings.open(&slice, hidden);

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::packet::Watch;
 use crate::accel::Tracer;
 use crate::geometry::{Dimension, Ray};
 use crate::progress::{Cancelled, Progress};
-use super::packet::Watch;
 use crate::trace::estimate::{Accumulator, Estimate};
 use crate::trace::{Error, NOTHING, RayBackend, Sampling, Sequence, ShadingPoint, Surroundings, translucent};
 

@@ -165,7 +165,8 @@ impl<const D: usize> Rays<D> {
 
     /// What [`Rays::take`] is about to write into `number` for each of the next `count` rays of the sequence.
     pub fn numbers(sequence: &Sequence, count: usize) -> [u8; BLOCK] {
-        let by_index = |keys: &[u32; 4], i: usize| scramble(sequence.next.wrapping_add(i as u32), keys[3]) % BLOCK as u32;
+        let by_index =
+            |keys: &[u32; 4], i: usize| scramble(sequence.next.wrapping_add(i as u32), keys[3]) % BLOCK as u32;
         std::array::from_fn(|i| match &sequence.source {
             Source::Sobol(keys) if count == BLOCK => by_index(keys, i) as u8,
             _ => i as u8,
