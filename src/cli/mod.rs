@@ -8,7 +8,9 @@ mod compare;
 mod console;
 mod devices;
 mod info;
+mod merge;
 mod options;
+mod piece;
 mod run;
 mod schema;
 mod study;
@@ -17,7 +19,6 @@ mod watch;
 use std::borrow::Cow;
 use std::ffi::OsString;
 use std::path::Path;
-use std::process::ExitCode;
 
 use ao4d::pipeline::RunError;
 use ao4d::text::for_terminal;
@@ -40,6 +41,8 @@ struct Cli {
 enum Verb {
     /// Run a pipeline and write its files
     Run(run::Run),
+    /// Make a pipeline's files of the pieces of its run
+    Merge(merge::Merge),
     /// Do everything short of running: print the plan, write nothing
     Check(check::Check),
     /// Measure error against time of the occlusion methods on a pipeline's scene
@@ -89,6 +92,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
             RunError::Refused(error) => Failure::Refused(Box::new(error)),
+            RunError::Pieces(error) => Failure::Refused(Box::new(error)),
             RunError::Cancelled(_) => Failure::Cancelled,
             error => Failure::Failed(Box::new(error)),
         }
@@ -110,25 +114,29 @@ fn existing(file: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Parses the command line and does what it says.
-pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Parses the command line, does what it says, and returns the exit code.
+///
+/// The first argument is the program's own name. Whoever embeds the program, such as its Python package, hands the rest in.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(refusal) => {
             // Help and version come this way too, with code 0. A closed pipe is no reason to fail. A refusal quotes
             // arguments, among them names of files; where a terminal would obey one, it goes without colours.
             let commands = |argument: OsString| matches!(for_terminal(&argument.to_string_lossy()), Cow::Owned(_));
-            if std::env::args_os().any(commands) {
+            if arguments.into_iter().any(commands) {
                 console::to_stderr(refusal.to_string().trim_end());
             } else {
                 let _ = refusal.print();
             }
-            return ExitCode::from(u8::try_from(refusal.exit_code()).unwrap_or(2));
+            return u8::try_from(refusal.exit_code()).unwrap_or(2);
         }
     };
     let console = Console::new(cli.messages);
     let result = match cli.verb {
         Verb::Run(run) => run.execute(&console),
+        Verb::Merge(merge) => merge.execute(&console),
         Verb::Check(check) => check.execute(&console),
         Verb::Study(study) => study.execute(&console),
         Verb::Compare(compare) => compare.execute(&console),
@@ -136,7 +144,7 @@ pub fn main() -> ExitCode {
         Verb::Devices(devices) => devices.execute(&console),
         Verb::Schema(schema) => schema.execute(&console),
     };
-    ExitCode::from(match result {
+    match result {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::Different) => 1,
         Err(Failure::Refused(error)) => {
@@ -151,7 +159,7 @@ pub fn main() -> ExitCode {
             watch::tell_interrupted(console.quiet());
             130
         }
-    })
+    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,8 @@
 //! - [`corners`]: where the surface creases, and vertices are split so that each side has a normal of its own;
 //! - simplices of measure zero, which no ray can hit.
 //!
-//! What is made of a mesh for the eye: cross-sections ([`section`]) and wireframes ([`edges`]).
+//! What is made of a mesh for the eye: cross-sections ([`section`]), peels of hyperspheres ([`peel`]) and wireframes
+//! ([`edges`]), and where the stereographic projection leads them ([`stereographic`]).
 
 mod approach;
 mod build;
@@ -28,8 +29,10 @@ mod incidence;
 mod nesting;
 pub mod normals;
 pub mod orientation;
+pub mod peel;
 pub mod rounding;
 pub mod section;
+pub mod stereographic;
 mod surface;
 pub mod topology;
 mod union_find;

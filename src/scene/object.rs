@@ -15,6 +15,7 @@ use super::numbers::{AXES, only_in};
 use super::polytope::PolytopeSpec;
 use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
+use super::slab::SlabSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
@@ -77,6 +78,9 @@ pub struct ObjectSpec {
     /// Shape: the product of a disc and a rectangle.
     #[serde(default)]
     pub cubinder: Option<CubinderSpec>,
+    /// What of it is kept: the part between two parallel hyperplanes, before it is placed. What was closed is closed again.
+    #[serde(default)]
+    pub slab: Option<SlabSpec>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -345,6 +349,9 @@ pub fn build_object_watched<const D: usize>(
     spec.surface_opacity()?;
     spec.gloss()?;
     let mut surface = shape.build::<D>(folder, notes, progress)?;
+    if let Some(slab) = &spec.slab {
+        surface = slab.cut(surface, progress)?;
+    }
     let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;
     check_single_precision(&surface, if spec.transform.is_empty() { shape.key() } else { "transform" })?;
