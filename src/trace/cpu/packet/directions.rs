@@ -163,11 +163,21 @@ impl<const D: usize> Rays<D> {
         (0..BLOCK).fold(0, |word, i| word | (set >> i & 1) << (self.number[i] % BLOCK as u8))
     }
 
-    /// Tells the first `count` rays, in the sequence's order, to `watch`: where each goes, and whether it is in the set.
-    pub fn tell(&self, set: u64, count: usize, watch: &mut dyn FnMut(Vector<D>, bool)) {
+    /// What [`Rays::take`] is about to write into `number` for each of the next `count` rays of the sequence.
+    pub fn numbers(sequence: &Sequence, count: usize) -> [u8; BLOCK] {
+        let by_index =
+            |keys: &[u32; 4], i: usize| scramble(sequence.next.wrapping_add(i as u32), keys[3]) % BLOCK as u32;
+        std::array::from_fn(|i| match &sequence.source {
+            Source::Sobol(keys) if count == BLOCK => by_index(keys, i) as u8,
+            _ => i as u8,
+        })
+    }
+
+    /// Tells the rays with these numbers, in this order, to `watch`: where each goes, and whether it is in the set.
+    pub fn tell(&self, set: u64, numbers: &[u8], watch: &mut dyn FnMut(Vector<D>, bool)) {
         let mut places = [0; BLOCK];
-        (0..count).for_each(|i| places[self.number[i] as usize % BLOCK] = i);
-        for &i in &places[..count] {
+        (0..numbers.len()).for_each(|i| places[self.number[i] as usize % BLOCK] = i);
+        for i in numbers.iter().map(|&number| places[number as usize % BLOCK]) {
             watch(Vector::from_fn(|k, _| self.direction[k][i]), set >> i & 1 == 1);
         }
     }

@@ -90,8 +90,7 @@ impl<const D: usize> PacketTracer<D> {
         self.at(tracer, point, sampling, None, progress)
     }
 
-    /// The same, and tells each ray to `watch`: block by block of 64, the rays of a block in an order that keeps aligned
-    /// runs of 2^k of them together. Objects that let light through count as opaque.
+    /// The same, and tells each ray to `watch`, in the sequence's order. Objects that let light through count as opaque.
     ///
     /// # Errors
     /// [`Cancelled`] if `progress` says so.
@@ -239,6 +238,10 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
             return Err(Cancelled);
         }
         let count = BLOCK.min(total - first);
+        let mut numbers = [0; BLOCK];
+        if let (Some(_), Source::Sequence { sequence, .. }) = (&watch, &source) {
+            numbers = Rays::<D>::numbers(sequence, count);
+        }
         match &mut source {
             Source::Sequence { sequence, frame, .. } => packets.rays.take(sequence, frame, count),
             Source::Directions(directions) => packets.rays.set(&directions[first..first + count]),
@@ -252,7 +255,7 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
             open &= !query.hits_far(&packets.rays, open);
         }
         if let Some(watch) = &mut watch {
-            packets.rays.tell(open, count, watch);
+            packets.rays.tell(open, &numbers[..count], watch);
         }
         accumulator.add(if accumulator.is_fine() { packets.rays.in_sequence(open) } else { open }, count as u32);
         if let Source::Sequence { target: Some(target), .. } = &source
