@@ -14,4 +14,4 @@ pub use bvh::Bvh;
 pub use node::Node;
 pub use passages::{Candidate, Passage, Wanted};
 pub use tracer::{Hit, Tracer};
-pub use wide::{Leaf, Scale, TAG_BITS, WIDTH, WideBvh, WideNode};
+pub use wide::{BOTTOM, LEAF, Leaf, NODE, Reference, Row, Scale, WIDTH, WideBvh, WideNode};

@@ -1,19 +1,22 @@
 //! The hierarchy as eight-wide nodes and leaves of eight simplices, laid out for SIMD.
 //!
 //! It is made from the binary [`Bvh`]: subtrees of up to eight simplices become a leaf where that is the cheaper, and
-//! every other node takes over grandchildren, the largest boxes first, until it has eight. The children of a node lie
-//! side by side, and the simplices of a leaf have their corners as rows of eight lanes, so that a visit touches few
-//! cache lines.
+//! every other node takes over grandchildren, the largest boxes first, until it has eight. Nodes and leaves lie in one
+//! piece of memory, as rows of eight numbers, one for each child or simplex; the children of a node lie side by side. So a
+//! visit touches few cache lines, and one number tells where a child is and what it is.
 //!
 //! Coordinates are scaled by a power of two that makes the scene about 1 wide, which loses nothing and keeps products of
-//! them far from overflow. Boxes are also moved to the scene's middle, where rounding is relative to its size, and
-//! grown by [`GROWTH`], more than all rounding of the box test together: a ray that meets a simplex is never told to
-//! miss a box around it, however the test is evaluated.
+//! them far from overflow. A box is kept as middle and half width, and the half width is a little too large, in
+//! *proportion* to itself ([`GROWTH`]). All rounding of a box test is in proportion too: to the half width, or to the
+//! distance of the middle from the origin of a ray, whose difference is rounded but never has the wrong sign. So a ray that
+//! meets a simplex is never told to miss a box around it, and yet a box without width stays so: rays that start in the
+//! flat face of a body don't go into the boxes of that face at all.
 //!
-//! Beside something that lies a million sizes away, or is as large, such boxes would hold little but what is beside them. Then
+//! Beside something that lies a million sizes away, or is as large, products of the coordinates of small things vanish. Then
 //! the scene is taken apart ([`super::apart`]): these nodes and leaves hold what lies together, in coordinates of its own,
 //! and a binary tree holds the rest.
 
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::{Bvh, apart};
@@ -22,47 +25,108 @@ use crate::mesh::Mesh;
 
 /// Children of a node, and simplices of a leaf.
 pub const WIDTH: usize = 8;
-/// What boxes grow by on each side, in widths of the scene. All rounding of a box, of its place, of the origin and in the box
-/// test is less: ten times numbers below 3/2 relative to 2^-24.
+/// What half widths of boxes grow by, in proportion. All rounding of a box, of the origin's distance from its middle and in
+/// the box test is less: a few numbers relative to 2^-24.
 const GROWTH: f64 = 1.0 / (1 << 20) as f64;
-/// Boxes of fewer growths than this hold mostly what is beside them.
-const COARSE: f64 = 4.0;
+/// The least half width of a box that has any: so that rays along an axis, which are taken to rise by 1e-30, stay in it.
+const LEAST: f32 = 1e-25;
+/// If most boxes are narrower than this, in widths of the scene, it may be one that has to be taken apart.
+const COARSE: f64 = 4.0 / (1 << 20) as f64;
 /// Cost of testing the boxes of one binary node, in simplex blocks.
 const BOX_COST: f32 = 0.4;
-/// Bits of a child reference that are left to its user.
-pub const TAG_BITS: u32 = 6;
+
+/// Eight numbers, one for each child of a node or each simplex of a leaf.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub struct Row(pub [f32; WIDTH]);
+
+/// A cache line.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([Row; 2]);
+
+/// A reference to a node or a leaf: the cache line where it begins, times four, and what it is.
+pub type Reference = u32;
+/// The lowest bits of a reference to a node.
+pub const NODE: Reference = 0;
+/// The lowest bits of a reference to a leaf.
+pub const LEAF: Reference = 1;
+/// Refers to nothing: the bottom of a stack.
+pub const BOTTOM: Reference = 2;
+/// Bits of a reference that tell what it refers to.
+const KIND_BITS: u32 = 2;
 
 /// Eight boxes and where their contents are. Unused places have boxes that no ray meets.
-#[derive(Clone, Debug)]
-#[repr(C, align(64))]
-pub struct WideNode<const D: usize> {
-    /// For each axis the middles of the boxes, then half their widths.
-    pub boxes: [[[f32; WIDTH]; 2]; D],
-    /// Indices of nodes or of leaves, shifted left by [`TAG_BITS`]. Larger boxes come last.
-    pub children: [u32; WIDTH],
-    /// Which of the children are leaves, lane 0 lowest.
-    pub leaves: u8,
-    /// Which places are used.
-    pub used: u8,
+#[derive(Clone, Copy, Debug)]
+pub struct WideNode<'a, const D: usize> {
+    rows: &'a [Row],
 }
 
-/// Up to eight simplices.
-#[derive(Clone, Debug)]
-#[repr(C, align(32))]
-pub struct Leaf<const D: usize> {
-    /// For each corner and axis the scaled coordinates.
-    pub corners: [[[f32; WIDTH]; D]; D],
-    /// Which simplices of the mesh these are; [`Leaf::UNUSED`] where there are fewer.
-    pub simplices: [u32; WIDTH],
-    /// The middle of the corners, scaled, and a bound on the 1-norm of what leads from there to a corner.
-    pub middle: [f32; D],
-    /// See `middle`.
-    pub reach: f32,
+impl<'a, const D: usize> WideNode<'a, D> {
+    /// For each axis the middles of the boxes, then half their widths; at last the references. A multiple of two rows makes
+    /// whole cache lines.
+    const ROWS: usize = (2 * D + 1).next_multiple_of(2);
+
+    /// The middles of the boxes along an axis.
+    #[inline(always)]
+    pub fn middle(&self, axis: usize) -> &'a [f32; WIDTH] {
+        &self.rows[2 * axis].0
+    }
+
+    /// Half the widths of the boxes along an axis.
+    #[inline(always)]
+    pub fn half(&self, axis: usize) -> &'a [f32; WIDTH] {
+        &self.rows[2 * axis + 1].0
+    }
+
+    /// References to nodes, then to leaves; of either, larger boxes come last.
+    #[inline(always)]
+    pub fn children(&self) -> &'a [Reference; WIDTH] {
+        bytemuck::cast_ref(&self.rows[2 * D].0)
+    }
 }
 
-impl<const D: usize> Leaf<D> {
-    /// Marks a lane without a simplex.
-    pub const UNUSED: u32 = u32::MAX;
+/// Up to eight simplices: corner 0 of each, and the edges from there to the others. Unused lanes repeat the last simplex, so
+/// that what is found of them is true.
+#[derive(Clone, Copy, Debug)]
+pub struct Leaf<'a, const D: usize> {
+    rows: &'a [Row],
+}
+
+impl<'a, const D: usize> Leaf<'a, D> {
+    /// A row that holds [`Self::middle`], `reach`, `edge` and where `range` begins and ends; then one for each corner and axis.
+    const ROWS: usize = (D * D + 1).next_multiple_of(2);
+
+    /// The scaled coordinates of corner 0 along an axis; for other corners how far they are from there.
+    #[inline(always)]
+    pub fn edge_row(&self, corner: usize, axis: usize) -> &'a [f32; WIDTH] {
+        &self.rows[1 + corner * D + axis].0
+    }
+
+    /// The middle of the corners, scaled.
+    #[inline(always)]
+    pub fn middle(&self, axis: usize) -> f32 {
+        self.rows[0].0[axis]
+    }
+
+    /// A bound on the 1-norm of what leads from the middle to a corner.
+    #[inline(always)]
+    pub fn reach(&self) -> f32 {
+        self.rows[0].0[4]
+    }
+
+    /// A bound on the 1-norms of the edges.
+    #[inline(always)]
+    pub fn edge(&self) -> f32 {
+        self.rows[0].0[5]
+    }
+
+    /// Which of [`WideBvh::order`] these are.
+    #[inline(always)]
+    pub fn range(&self) -> std::ops::Range<usize> {
+        let [first, count] = [6, 7].map(|i| self.rows[0].0[i].to_bits() as usize);
+        first..first + count
+    }
 }
 
 /// Where the coordinates of the nodes and leaves come from.
@@ -106,17 +170,19 @@ impl<const D: usize> Scale<D> {
 /// The wide hierarchy.
 #[derive(Clone, Debug)]
 pub struct WideBvh<const D: usize> {
-    /// The root first; empty if there are no simplices.
-    pub nodes: Vec<WideNode<D>>,
-    /// The simplices.
-    pub leaves: Vec<Leaf<D>>,
+    /// All nodes and leaves, the root first; empty if there are no simplices.
+    lines: Vec<Line>,
+    /// The simplices, leaf after leaf.
+    pub order: Vec<u32>,
     /// The coordinates used.
     pub scale: Scale<D>,
     /// Nodes on the longest way from the root to a leaf.
     pub depth: usize,
-    /// The number of simplices of the mesh.
-    total: usize,
-    /// Whether most boxes are larger than what they grow by.
+    /// How many nodes there are.
+    pub nodes: usize,
+    /// How many leaves there are.
+    pub leaves: usize,
+    /// Whether most boxes are fine beside the scene.
     fine: bool,
     /// What lies apart, and is in none of the nodes and leaves.
     pub far: Bvh<D>,
@@ -164,7 +230,7 @@ impl<const D: usize> WideBvh<D> {
             return whole;
         }
         let bounds = |simplex| Aabb::of(&mesh.corners(simplex));
-        let Some((near, far)) = apart::parts(&bvh.order, bounds, COARSE * GROWTH) else { return whole };
+        let Some((near, far)) = apart::parts(&bvh.order, bounds, COARSE) else { return whole };
         let near = Bvh::build(&near, bounds, parallel);
         let scale = Scale::around(&near.nodes[0].bounds);
         Self { far: Bvh::build(&far, bounds, parallel), of_part: true, ..Self::over(&near, mesh, scale, parallel) }
@@ -173,11 +239,12 @@ impl<const D: usize> WideBvh<D> {
     /// Of what is in the binary tree, in coordinates of this scale.
     fn over(bvh: &Bvh<D>, mesh: &Mesh<D>, scale: Scale<D>, parallel: bool) -> Self {
         let mut wide = Self {
-            nodes: Vec::new(),
-            leaves: Vec::new(),
+            lines: Vec::new(),
+            order: bvh.order.clone(),
             scale,
             depth: 0,
-            total: mesh.simplices.len(),
+            nodes: 0,
+            leaves: 0,
             fine: true,
             far: Bvh::default(),
             of_part: false,
@@ -186,46 +253,97 @@ impl<const D: usize> WideBvh<D> {
             return wide;
         }
         let plan = Plan::new(bvh);
-        wide.nodes.push(WideNode::empty());
+        let [node_lines, leaf_lines] = [WideNode::<D>::ROWS, Leaf::<D>::ROWS].map(|rows| rows / 2);
+        // Each node but the root has at least two children.
+        let most = plan.is_leaf.iter().filter(|&&is_leaf| is_leaf).count();
+        wide.lines.reserve_exact(most * (node_lines + leaf_lines) + node_lines);
+        wide.lines.resize(node_lines, Line::zeroed());
         let mut open = vec![(0usize, 0usize, 1usize)];
         let (mut leaves, mut sides) = (Vec::new(), Vec::new());
         while let Some((source, target, depth)) = open.pop() {
-            wide.depth = wide.depth.max(depth);
+            (wide.depth, wide.nodes) = (wide.depth.max(depth), wide.nodes + 1);
             let children = Self::children(bvh, &plan, source);
+            let mut references = [BOTTOM; WIDTH];
             for (lane, &child) in children.iter().enumerate() {
-                let index = if plan.is_leaf[child] {
-                    leaves.push(plan.ranges[child]);
+                let place = wide.lines.len();
+                let is_leaf = plan.is_leaf[child];
+                wide.lines.resize(place + if is_leaf { leaf_lines } else { node_lines }, Line::zeroed());
+                if is_leaf {
+                    leaves.push((place, plan.ranges[child]));
                     let bounds = &bvh.nodes[child].bounds;
                     sides.push((widen(&bounds.max) - widen(&bounds.min)).max() * wide.scale.factor);
-                    wide.nodes[target].leaves |= 1 << lane;
-                    (leaves.len() - 1) as u32
                 } else {
-                    open.push((child, wide.nodes.len(), depth + 1));
-                    wide.nodes.push(WideNode::empty());
-                    (wide.nodes.len() - 1) as u32
-                };
-                wide.nodes[target].set(lane, &bvh.nodes[child].bounds, index << TAG_BITS, &wide.scale);
+                    open.push((child, place, depth + 1));
+                }
+                references[lane] = (place as u32) << KIND_BITS | if is_leaf { LEAF } else { NODE };
             }
+            let boxes = children.iter().map(|&child| &bvh.nodes[child].bounds);
+            write_node(rows_of(&mut wide.lines[target..target + node_lines]), boxes, &references, &wide.scale);
         }
-        wide.nodes.shrink_to_fit();
+        wide.lines.shrink_to_fit();
+        wide.leaves = leaves.len();
         let middle = sides.len() / 2;
-        wide.fine = *sides.select_nth_unstable_by(middle, f64::total_cmp).1 > COARSE * GROWTH;
-        let leaf = |(first, end): (u32, u32)| Leaf::new(&bvh.order[first as usize..end as usize], mesh, &wide.scale);
-        wide.leaves = if parallel {
-            leaves.into_par_iter().with_min_len(256).map(leaf).collect()
+        wide.fine = *sides.select_nth_unstable_by(middle, f64::total_cmp).1 > COARSE;
+        leaves.sort_unstable();
+        let mut rest = wide.lines.as_mut_slice();
+        let mut passed = 0;
+        let mut places = Vec::with_capacity(leaves.len());
+        for (place, range) in leaves {
+            let (lines, behind) = rest.split_at_mut(place - passed).1.split_at_mut(leaf_lines);
+            (rest, passed) = (behind, place + leaf_lines);
+            places.push((rows_of(lines), range));
+        }
+        let write = |(rows, range): (&mut [Row], (u32, u32))| write_leaf(rows, range, &bvh.order, mesh, &scale);
+        if parallel {
+            places.into_par_iter().with_min_len(256).for_each(write);
         } else {
-            leaves.into_iter().map(leaf).collect()
-        };
+            places.into_iter().for_each(write);
+        }
         wide
     }
 
-    /// Whether there are few enough nodes and leaves for references to them, boxes that hold little but what is in them, and
-    /// the point is near enough to them for box tests. If not, ask the binary tree of all, whose boxes don't grow.
+    /// Where a traversal starts, unless there are no simplices.
+    pub fn root(&self) -> Option<Reference> {
+        (!self.lines.is_empty()).then_some(NODE)
+    }
+
+    /// All rows: where a reference leads is found by [`Self::place`].
+    #[inline(always)]
+    pub fn rows(&self) -> &[Row] {
+        bytemuck::cast_slice(&self.lines)
+    }
+
+    /// The row where what it refers to begins.
+    #[inline(always)]
+    pub fn place(reference: Reference) -> usize {
+        2 * (reference >> KIND_BITS) as usize
+    }
+
+    /// The node it refers to.
+    #[inline(always)]
+    pub fn node(&self, reference: Reference) -> WideNode<'_, D> {
+        let place = Self::place(reference);
+        WideNode { rows: &self.rows()[place..place + WideNode::<D>::ROWS] }
+    }
+
+    /// The leaf it refers to.
+    #[inline(always)]
+    pub fn leaf(&self, reference: Reference) -> Leaf<'_, D> {
+        let place = Self::place(reference);
+        Leaf { rows: &self.rows()[place..place + Leaf::<D>::ROWS] }
+    }
+
+    /// The memory of all nodes, and of all leaves with the list of simplices.
+    pub fn bytes(&self) -> [usize; 2] {
+        let row = size_of::<Row>();
+        let leaves = self.leaves * Leaf::<D>::ROWS * row + self.order.len() * size_of::<u32>();
+        [self.nodes * WideNode::<D>::ROWS * row, leaves]
+    }
+
+    /// Whether references reach everything, boxes are fine beside the scene, and the point is near enough to them. If not,
+    /// ask the binary tree of all.
     pub fn serves(&self, point: &Vector<D>) -> bool {
-        self.fine
-            && self.nodes.len().max(self.leaves.len()) < 1 << (32 - TAG_BITS)
-            && self.total < 1 << 31
-            && self.is_near(point)
+        self.fine && self.lines.len() < 1 << (32 - KIND_BITS) && self.is_near(point)
     }
 
     /// Whether these simplices, too, lie where the coordinates of the leaves are made for.
@@ -237,7 +355,8 @@ impl<const D: usize> WideBvh<D> {
         self.scale.centred(point).amax() <= 1.0
     }
 
-    /// The nodes of the binary tree that become the children of what `source` becomes, smallest box first.
+    /// The nodes of the binary tree that become the children of what `source` becomes: nodes first, of either kind the
+    /// smallest box first.
     fn children(bvh: &Bvh<D>, plan: &Plan, source: usize) -> Vec<usize> {
         if plan.is_leaf[source] {
             return vec![source];
@@ -251,48 +370,65 @@ impl<const D: usize> WideBvh<D> {
             children[largest] = left;
             children.push(left + 1);
         }
-        children.sort_by(|&a, &b| area(a).total_cmp(&area(b)));
+        children.sort_by(|&a, &b| plan.is_leaf[a].cmp(&plan.is_leaf[b]).then(area(a).total_cmp(&area(b))));
         children
     }
 }
 
-impl<const D: usize> WideNode<D> {
-    fn empty() -> Self {
-        // Of negative width: the near plane is never before the far one.
-        Self { boxes: [[[0.0; WIDTH], [-1e30; WIDTH]]; D], children: [0; WIDTH], leaves: 0, used: 0 }
-    }
-
-    fn set(&mut self, lane: usize, bounds: &Aabb<D>, child: u32, scale: &Scale<D>) {
-        for axis in 0..D {
-            let place = |x: f32| (f64::from(x) - scale.centre[axis]) * scale.factor;
-            let (low, high) = (place(bounds.min[axis]), place(bounds.max[axis]));
-            self.boxes[axis][0][lane] = (0.5 * (low + high)) as f32;
-            self.boxes[axis][1][lane] = (0.5 * (high - low) + GROWTH) as f32;
-        }
-        self.children[lane] = child;
-        self.used |= 1 << lane;
-    }
+fn rows_of(lines: &mut [Line]) -> &mut [Row] {
+    bytemuck::cast_slice_mut(lines)
 }
 
-impl<const D: usize> Leaf<D> {
-    fn new(simplices: &[u32], mesh: &Mesh<D>, scale: &Scale<D>) -> Self {
-        let bounds =
-            Aabb::of(simplices.iter().flat_map(|&s| mesh.simplices[s as usize]).map(|v| &mesh.vertices[v as usize]));
+/// Writes the rows of a node.
+fn write_node<'a, const D: usize>(
+    rows: &mut [Row],
+    boxes: impl Iterator<Item = &'a Aabb<D>>,
+    references: &[Reference; WIDTH],
+    scale: &Scale<D>,
+) {
+    for axis in 0..D {
+        // Of negative width: the near plane is never before the far one.
+        rows[2 * axis + 1] = Row([-1e30; WIDTH]);
+    }
+    for (lane, bounds) in boxes.enumerate() {
         let (low, high) = (scale.scaled(&bounds.min), scale.scaled(&bounds.max));
-        let middle: [f32; D] = std::array::from_fn(|k| 0.5 * (low[k] + high[k]));
-        let reach = (0..D).map(|k| (middle[k] - low[k]).max(high[k] - middle[k])).sum::<f32>() * (1.0 + 1e-5);
-        let mut leaf = Self { corners: [[[0.0; WIDTH]; D]; D], simplices: [Self::UNUSED; WIDTH], middle, reach };
-        for lane in 0..WIDTH {
-            // Unused lanes repeat the last simplex, so that their numbers are harmless.
-            let simplex = simplices[lane.min(simplices.len() - 1)];
-            if lane < simplices.len() {
-                leaf.simplices[lane] = simplex;
-            }
-            for (corner, vertex) in mesh.corners(simplex).iter().enumerate() {
-                let scaled = scale.scaled(vertex);
-                (0..D).for_each(|axis| leaf.corners[corner][axis][lane] = scaled[axis]);
+        for axis in 0..D {
+            let [low, high] = [low, high].map(|corner| f64::from(corner[axis]));
+            let middle = (0.5 * (low + high)) as f32;
+            let half = (high - f64::from(middle)).max(f64::from(middle) - low);
+            rows[2 * axis].0[lane] = middle;
+            rows[2 * axis + 1].0[lane] = if half > 0.0 { ((half * (1.0 + GROWTH)) as f32).max(LEAST) } else { 0.0 };
+        }
+    }
+    rows[2 * D].0 = bytemuck::cast(*references);
+}
+
+/// Writes the rows of a leaf with these simplices of the order.
+fn write_leaf<const D: usize>(
+    rows: &mut [Row],
+    (first, end): (u32, u32),
+    order: &[u32],
+    mesh: &Mesh<D>,
+    scale: &Scale<D>,
+) {
+    let (mut low, mut high): (Vector<D>, Vector<D>) =
+        (Vector::from_element(f32::INFINITY), Vector::from_element(f32::NEG_INFINITY));
+    let mut longest = 0.0f32;
+    for lane in 0..WIDTH {
+        let corners = mesh.corners(order[(first + lane as u32).min(end - 1) as usize]).map(|v| scale.scaled(&v));
+        for (corner, position) in corners.iter().enumerate() {
+            (low, high) = (low.inf(position), high.sup(position));
+            let edge = if corner == 0 { *position } else { position - corners[0] };
+            (0..D).for_each(|axis| rows[1 + corner * D + axis].0[lane] = edge[axis]);
+            if corner > 0 {
+                longest = longest.max(edge.iter().map(|x| x.abs()).sum());
             }
         }
-        leaf
     }
+    let middle = (low + high) * 0.5;
+    let reach = (0..D).map(|k| (middle[k] - low[k]).max(high[k] - middle[k])).sum::<f32>();
+    let about = &mut rows[0].0;
+    (0..D).for_each(|axis| about[axis] = middle[axis]);
+    (about[4], about[5]) = (reach * (1.0 + 1e-5), longest * (1.0 + 1e-5));
+    (about[6], about[7]) = (f32::from_bits(first), f32::from_bits(end - first));
 }
