@@ -43,9 +43,6 @@ pub(super) struct Rays<const D: usize> {
     pub absolute: [[f32; BLOCK]; D],
     /// The cosine to the normal.
     pub height: [f32; BLOCK],
-    /// The place of each ray in the sequence, counted from the block's first: of Sobol' points of a whole block, in the
-    /// order of their indices, which keeps aligned runs of 2^k rays together.
-    pub number: [u8; BLOCK],
 }
 
 impl<const D: usize> Rays<D> {
@@ -55,7 +52,6 @@ impl<const D: usize> Rays<D> {
             inverse: [[0.0; BLOCK]; D],
             absolute: [[0.0; BLOCK]; D],
             height: [0.0; BLOCK],
-            number: [0; BLOCK],
         }
     }
 
@@ -96,7 +92,6 @@ impl<const D: usize> Rays<D> {
                 sequence.next = sequence.next.wrapping_add(count as u32);
             }
         }
-        let points = in_order::<D>(&points, count, &mut self.number);
         self.lift(&points, frame);
     }
 
@@ -138,13 +133,7 @@ impl<const D: usize> Rays<D> {
         for (i, direction) in directions.iter().enumerate().take(BLOCK) {
             (0..D).for_each(|k| self.direction[k][i] = direction[k]);
             self.height[i] = direction.dot(normal);
-            self.number[i] = i as u8;
         }
-    }
-
-    /// The bits of a set of rays by their place in the sequence.
-    pub fn in_sequence(&self, set: u64) -> u64 {
-        (0..BLOCK).fold(0, |word, i| word | (set >> i & 1) << (self.number[i] % BLOCK as u8))
     }
 
     /// Completes the directions by what box tests need.
@@ -193,49 +182,6 @@ impl<const D: usize> Rays<D> {
         }
         direction
     }
-}
-
-/// The points cell by cell of a grid of 64 cells along Morton's curve, so that neighbours in a block go to the same
-/// parts of the scene.
-#[inline(always)]
-fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize, number: &mut [u8; BLOCK]) -> [[f32; BLOCK]; 3] {
-    // Bits of the cells along an axis, spread apart to be joined.
-    const SPREAD_2: [u8; 8] = [0, 1, 4, 5, 16, 17, 20, 21];
-    const SPREAD_3: [u8; 4] = [0, 1, 8, 9];
-    let cell = |x: f32, cells: f32| ((x + 1.0) * (cells * 0.5)) as i32 as usize;
-    let mut keys = [0u8; BLOCK];
-    for i in 0..BLOCK {
-        keys[i] = match Dimension::of::<D>() {
-            Dimension::Three => {
-                let spread = |x: f32| SPREAD_2[cell(x, 8.0) % 8];
-                spread(points[0][i]) | spread(points[1][i]) << 1
-            }
-            Dimension::Four => {
-                let spread = |x: f32| SPREAD_3[cell(x, 4.0) % 4];
-                spread(points[0][i]) | spread(points[1][i]) << 1 | spread(points[2][i]) << 2
-            }
-        };
-    }
-    let mut ends = [0u8; BLOCK];
-    for &key in &keys[..count] {
-        ends[key as usize % BLOCK] += 1;
-    }
-    let mut sum = 0;
-    for end in &mut ends {
-        sum += *end;
-        *end = sum;
-    }
-    let mut ordered = [[0.0; BLOCK]; 3];
-    for (i, &key) in keys[..count].iter().enumerate() {
-        let end = &mut ends[key as usize % BLOCK];
-        *end -= 1;
-        let place = *end as usize % BLOCK;
-        number[place] = i as u8;
-        for d in 0..D - 1 {
-            ordered[d][place] = points[d][i];
-        }
-    }
-    ordered
 }
 
 /// As [`Sequence::next_point`] makes a coordinate of bits; 24 of them fit a signed number.

@@ -105,7 +105,7 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
         highest = highest.max(height.add(dot(edge, &normal)));
     }
     let mut aside = highest.less_or_equal(L::splat(view.low(query)));
-    if view.distance == 0.0 {
+    if view.distance == 0.0 && !query.around.is_empty() && has_corner_at_origin(&columns) {
         aside |= query.around_lanes(&leaf);
     }
     if !query.ignored.is_empty() {
@@ -155,6 +155,21 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
         hits |= u64::from(hit) << i;
     }
     hits
+}
+
+/// Whether a corner seems to be where the origin is.
+#[inline(always)]
+fn has_corner_at_origin<L: Lanes, const D: usize>(columns: &[[L; D]; D]) -> bool {
+    let mut nearest = L::splat(f32::INFINITY);
+    for corner in 0..D {
+        let mut distance = L::splat(0.0);
+        for k in 0..D {
+            let way = if corner == 0 { columns[0][k] } else { columns[0][k].add(columns[corner][k]) };
+            distance = distance.max(way.abs());
+        }
+        nearest = nearest.min(distance);
+    }
+    nearest.less_or_equal(L::splat(0.0)) != 0
 }
 
 /// How steep a way from the origin to simplices may be that aren't aside: its height over the tangent hyperplane to what it

@@ -223,7 +223,7 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
         if !query.wide.far.nodes.is_empty() {
             open &= !query.hits_far(&packets.rays, open);
         }
-        accumulator.add(if accumulator.is_fine() { packets.rays.in_sequence(open) } else { open }, count as u32);
+        accumulator.add(open, count as u32);
         if let Source::Sequence { target: Some(target), .. } = &source
             && target.is_met(&accumulator)
         {
