@@ -4,6 +4,7 @@
 mod apart;
 mod build;
 mod bvh;
+mod lines;
 mod node;
 mod overlap;
 mod passages;
@@ -11,7 +12,8 @@ mod tracer;
 mod wide;
 
 pub use bvh::Bvh;
+pub use lines::Row;
 pub use node::Node;
 pub use passages::{Candidate, Passage, Wanted};
 pub use tracer::{Hit, Tracer};
-pub use wide::{BOTTOM, LEAF, Leaf, NODE, Reference, Row, Scale, WIDTH, WideBvh, WideNode};
+pub use wide::{BOTTOM, LEAF, Leaf, NODE, Reference, Scale, WIDTH, WideBvh, WideNode, place};

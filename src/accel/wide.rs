@@ -16,9 +16,9 @@
 //! the scene is taken apart ([`super::apart`]): these nodes and leaves hold what lies together, in coordinates of its own,
 //! and a binary tree holds the rest.
 
-use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
+use super::lines::{Lines, Row};
 use super::{Bvh, apart};
 use crate::geometry::{Aabb, Vector, Vector64, widen};
 use crate::mesh::Mesh;
@@ -35,16 +35,6 @@ const COARSE: f64 = 4.0 / (1 << 20) as f64;
 /// Cost of testing the boxes of one binary node, in simplex blocks.
 const BOX_COST: f32 = 0.4;
 
-/// Eight numbers, one for each child of a node or each simplex of a leaf.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C, align(32))]
-pub struct Row(pub [f32; WIDTH]);
-
-/// A cache line.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C, align(64))]
-struct Line([Row; 2]);
-
 /// A reference to a node or a leaf: the cache line where it begins, times four, and what it is.
 pub type Reference = u32;
 /// The lowest bits of a reference to a node.
@@ -56,6 +46,12 @@ pub const BOTTOM: Reference = 2;
 /// Bits of a reference that tell what it refers to.
 const KIND_BITS: u32 = 2;
 
+/// The row where what it refers to begins.
+#[inline(always)]
+pub fn place(reference: Reference) -> usize {
+    2 * (reference >> KIND_BITS) as usize
+}
+
 /// Eight boxes and where their contents are. Unused places have boxes that no ray meets.
 #[derive(Clone, Copy, Debug)]
 pub struct WideNode<'a, const D: usize> {
@@ -66,6 +62,13 @@ impl<'a, const D: usize> WideNode<'a, D> {
     /// For each axis the middles of the boxes, then half their widths; at last the references. A multiple of two rows makes
     /// whole cache lines.
     const ROWS: usize = (2 * D + 1).next_multiple_of(2);
+
+    /// The node that it refers to.
+    #[inline(always)]
+    pub fn at(rows: &'a [Row], reference: Reference) -> Self {
+        let place = place(reference);
+        Self { rows: &rows[place..place + Self::ROWS] }
+    }
 
     /// The middles of the boxes along an axis.
     #[inline(always)]
@@ -96,6 +99,13 @@ pub struct Leaf<'a, const D: usize> {
 impl<'a, const D: usize> Leaf<'a, D> {
     /// A row that holds [`Self::middle`], `reach`, `edge` and where `range` begins and ends; then one for each corner and axis.
     const ROWS: usize = (D * D + 1).next_multiple_of(2);
+
+    /// The leaf that it refers to.
+    #[inline(always)]
+    pub fn at(rows: &'a [Row], reference: Reference) -> Self {
+        let place = place(reference);
+        Self { rows: &rows[place..place + Self::ROWS] }
+    }
 
     /// The scaled coordinates of corner 0 along an axis; for other corners how far they are from there.
     #[inline(always)]
@@ -171,7 +181,7 @@ impl<const D: usize> Scale<D> {
 #[derive(Clone, Debug)]
 pub struct WideBvh<const D: usize> {
     /// All nodes and leaves, the root first; empty if there are no simplices.
-    lines: Vec<Line>,
+    lines: Lines,
     /// The simplices, leaf after leaf.
     pub order: Vec<u32>,
     /// The coordinates used.
@@ -239,7 +249,7 @@ impl<const D: usize> WideBvh<D> {
     /// Of what is in the binary tree, in coordinates of this scale.
     fn over(bvh: &Bvh<D>, mesh: &Mesh<D>, scale: Scale<D>, parallel: bool) -> Self {
         let mut wide = Self {
-            lines: Vec::new(),
+            lines: Lines::default(),
             order: bvh.order.clone(),
             scale,
             depth: 0,
@@ -256,8 +266,8 @@ impl<const D: usize> WideBvh<D> {
         let [node_lines, leaf_lines] = [WideNode::<D>::ROWS, Leaf::<D>::ROWS].map(|rows| rows / 2);
         // Each node but the root has at least two children.
         let most = plan.is_leaf.iter().filter(|&&is_leaf| is_leaf).count();
-        wide.lines.reserve_exact(most * (node_lines + leaf_lines) + node_lines);
-        wide.lines.resize(node_lines, Line::zeroed());
+        wide.lines = Lines::with_room(most * (node_lines + leaf_lines) + node_lines);
+        wide.lines.add(node_lines);
         let mut open = vec![(0usize, 0usize, 1usize)];
         let (mut leaves, mut sides) = (Vec::new(), Vec::new());
         while let Some((source, target, depth)) = open.pop() {
@@ -265,9 +275,8 @@ impl<const D: usize> WideBvh<D> {
             let children = Self::children(bvh, &plan, source);
             let mut references = [BOTTOM; WIDTH];
             for (lane, &child) in children.iter().enumerate() {
-                let place = wide.lines.len();
                 let is_leaf = plan.is_leaf[child];
-                wide.lines.resize(place + if is_leaf { leaf_lines } else { node_lines }, Line::zeroed());
+                let place = wide.lines.add(if is_leaf { leaf_lines } else { node_lines });
                 if is_leaf {
                     leaves.push((place, plan.ranges[child]));
                     let bounds = &bvh.nodes[child].bounds;
@@ -278,20 +287,19 @@ impl<const D: usize> WideBvh<D> {
                 references[lane] = (place as u32) << KIND_BITS | if is_leaf { LEAF } else { NODE };
             }
             let boxes = children.iter().map(|&child| &bvh.nodes[child].bounds);
-            write_node(rows_of(&mut wide.lines[target..target + node_lines]), boxes, &references, &wide.scale);
+            write_node(&mut wide.lines.rows_mut()[2 * target..2 * (target + node_lines)], boxes, &references, &scale);
         }
-        wide.lines.shrink_to_fit();
         wide.leaves = leaves.len();
         let middle = sides.len() / 2;
         wide.fine = *sides.select_nth_unstable_by(middle, f64::total_cmp).1 > COARSE;
         leaves.sort_unstable();
-        let mut rest = wide.lines.as_mut_slice();
+        let mut rest = wide.lines.rows_mut();
         let mut passed = 0;
         let mut places = Vec::with_capacity(leaves.len());
         for (place, range) in leaves {
-            let (lines, behind) = rest.split_at_mut(place - passed).1.split_at_mut(leaf_lines);
+            let (rows, behind) = rest.split_at_mut(2 * (place - passed)).1.split_at_mut(2 * leaf_lines);
             (rest, passed) = (behind, place + leaf_lines);
-            places.push((rows_of(lines), range));
+            places.push((rows, range));
         }
         let write = |(rows, range): (&mut [Row], (u32, u32))| write_leaf(rows, range, &bvh.order, mesh, &scale);
         if parallel {
@@ -304,33 +312,12 @@ impl<const D: usize> WideBvh<D> {
 
     /// Where a traversal starts, unless there are no simplices.
     pub fn root(&self) -> Option<Reference> {
-        (!self.lines.is_empty()).then_some(NODE)
+        (self.lines.len() > 0).then_some(NODE)
     }
 
-    /// All rows: where a reference leads is found by [`Self::place`].
-    #[inline(always)]
+    /// All rows, among which [`WideNode::at`] and [`Leaf::at`] find what a reference refers to.
     pub fn rows(&self) -> &[Row] {
-        bytemuck::cast_slice(&self.lines)
-    }
-
-    /// The row where what it refers to begins.
-    #[inline(always)]
-    pub fn place(reference: Reference) -> usize {
-        2 * (reference >> KIND_BITS) as usize
-    }
-
-    /// The node it refers to.
-    #[inline(always)]
-    pub fn node(&self, reference: Reference) -> WideNode<'_, D> {
-        let place = Self::place(reference);
-        WideNode { rows: &self.rows()[place..place + WideNode::<D>::ROWS] }
-    }
-
-    /// The leaf it refers to.
-    #[inline(always)]
-    pub fn leaf(&self, reference: Reference) -> Leaf<'_, D> {
-        let place = Self::place(reference);
-        Leaf { rows: &self.rows()[place..place + Leaf::<D>::ROWS] }
+        self.lines.rows()
     }
 
     /// The memory of all nodes, and of all leaves with the list of simplices.
@@ -373,10 +360,6 @@ impl<const D: usize> WideBvh<D> {
         children.sort_by(|&a, &b| plan.is_leaf[a].cmp(&plan.is_leaf[b]).then(area(a).total_cmp(&area(b))));
         children
     }
-}
-
-fn rows_of(lines: &mut [Line]) -> &mut [Row] {
-    bytemuck::cast_slice_mut(lines)
 }
 
 /// Writes the rows of a node.

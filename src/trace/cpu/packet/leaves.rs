@@ -91,7 +91,7 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
     leaf: Reference,
     set: u64,
 ) -> u64 {
-    let leaf = query.wide.leaf(leaf);
+    let leaf = Leaf::at(query.rows, leaf);
     let view = View::new(query, &leaf);
     let columns = columns::<L, D>(query, &leaf);
     // What all rays pass over.
@@ -288,7 +288,7 @@ pub(super) fn hits_of_one<L: Lanes, const D: usize>(
     leaf: Reference,
     i: usize,
 ) -> [bool; 2] {
-    let leaf = query.wide.leaf(leaf);
+    let leaf = Leaf::at(query.rows, leaf);
     let [mut surely, perhaps] = judge_one::<L, D>(query, rays, &leaf, i);
     if !query.ignored.is_empty() && perhaps != 0 {
         surely &= !query.ignored_lanes(&leaf);

@@ -1,13 +1,15 @@
 //! What is asked: which rays from a point hit a mesh.
 
 use super::directions::{BLOCK, Rays};
-use crate::accel::{Leaf, Tracer, WideBvh};
+use crate::accel::{Leaf, Row, Tracer, WideBvh};
 use crate::geometry::{Ray, Vector};
 
 /// One shading point among the simplices of a mesh.
 pub(super) struct Query<'t, const D: usize> {
     pub tracer: &'t Tracer<D>,
     pub wide: &'t WideBvh<D>,
+    /// The nodes and leaves.
+    pub rows: &'t [Row],
     pub position: Vector<D>,
     /// The position in the coordinates of the boxes and leaves.
     pub scaled: Vector<D>,
@@ -33,7 +35,19 @@ impl<'t, const D: usize> Query<'t, D> {
         [ignored, around]: [&'t [u32]; 2],
     ) -> Self {
         let wide = tracer.wide();
-        Self { tracer, wide, position, scaled: wide.scale.scaled(&position), normal, rise, limit, ignored, around }
+        let rows = wide.rows();
+        Self {
+            tracer,
+            wide,
+            rows,
+            position,
+            scaled: wide.scale.scaled(&position),
+            normal,
+            rise,
+            limit,
+            ignored,
+            around,
+        }
     }
 
     /// A ray of a block, for exact arithmetic.

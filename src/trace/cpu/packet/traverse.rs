@@ -14,7 +14,7 @@ use super::directions::{BLOCK, Rays};
 use super::lanes::Lanes;
 use super::leaves::{hits_of_one, hits_of_set};
 use super::query::Query;
-use crate::accel::{BOTTOM, LEAF, NODE, Reference, WIDTH, WideBvh};
+use crate::accel::{BOTTOM, LEAF, NODE, Reference, WIDTH, WideNode, place};
 
 /// Fewer rays than this at a node go their own ways.
 const FEW: u32 = 8;
@@ -95,13 +95,13 @@ impl<const D: usize> Traversal<D> {
                 continue;
             }
             let (mut met, [low, high]) = meet_set::<L, D>(query, rays, limit, reference, set);
-            let children = query.wide.node(reference).children();
+            let children = WideNode::<D>::at(query.rows, reference).children();
             while met != 0 {
                 let child = met.trailing_zeros() as usize % WIDTH;
                 met &= met - 1;
                 self.sets[count] = (u64::from(low[child]) | u64::from(high[child]) << 32, children[child]);
                 count += 1;
-                L::fetch::<D>(query.wide.rows(), WideBvh::<D>::place(children[child]));
+                L::fetch::<D>(query.rows, place(children[child]));
             }
         }
     }
@@ -150,7 +150,7 @@ impl<const D: usize> Traversal<D> {
                 let ray = at_node[now][n];
                 let i = ray as usize % BLOCK;
                 let top = tops[i] as usize;
-                let node = query.wide.node(stacks[top]);
+                let node = WideNode::<D>::at(query.rows, stacks[top]);
                 let (mut enter, mut exit) = (L::splat(AHEAD), limit);
                 for k in 0..D {
                     let absolute = L::splat(rays.absolute[k][i]);
@@ -160,15 +160,15 @@ impl<const D: usize> Traversal<D> {
                     exit = exit.min(absolute.mul_add(half, middle));
                 }
                 let met = enter.less_or_equal(exit.mul(L::splat(1.0 + APART)));
-                let Some(place) = stacks.get_mut(top..).and_then(<[u32]>::first_chunk_mut) else { unreachable!() };
-                L::compress(node.children(), met, place);
+                let Some(end) = stacks.get_mut(top..).and_then(<[u32]>::first_chunk_mut) else { unreachable!() };
+                L::compress(node.children(), met, end);
                 let top = top + met.count_ones() as usize - 1;
                 tops[i] = top as u32;
                 let reference = stacks[top];
                 (at_node[next][next_nodes], at_leaf[next][next_leaves]) = (ray, ray);
                 next_nodes += usize::from(reference & KIND == NODE);
                 next_leaves += usize::from(reference & KIND == LEAF);
-                L::fetch::<D>(query.wide.rows(), WideBvh::<D>::place(reference));
+                L::fetch::<D>(query.rows, place(reference));
             }
             for n in 0..leaves {
                 let ray = at_leaf[now][n];
@@ -185,7 +185,7 @@ impl<const D: usize> Traversal<D> {
                 (at_node[next][next_nodes], at_leaf[next][next_leaves]) = (ray, ray);
                 next_nodes += usize::from(!hit & (reference & KIND == NODE));
                 next_leaves += usize::from(!hit & (reference & KIND == LEAF));
-                L::fetch::<D>(query.wide.rows(), WideBvh::<D>::place(reference));
+                L::fetch::<D>(query.rows, place(reference));
             }
             (nodes, leaves, now) = (next_nodes, next_leaves, next);
         }
@@ -201,7 +201,7 @@ fn meet_set<L: Lanes, const D: usize>(
     node: Reference,
     set: u64,
 ) -> (u8, [[u32; WIDTH]; 2]) {
-    let node = query.wide.node(node);
+    let node = WideNode::<D>::at(query.rows, node);
     let (mut middles, mut halves) = ([limit; D], [limit; D]);
     for k in 0..D {
         middles[k] = L::load(node.middle(k)).sub(L::splat(query.scaled[k]));
