@@ -22,7 +22,8 @@ import paraview.simple
 
 # ---------------------------------------------------------------------------------------------- the figure: edit here
 
-# The volumes from left to right; files beside this one. A `.pvd` is an animation: a list of volumes with their times.
+# The panels from left to right; files beside this one. A `.pvd` is an animation: a list of volumes with their times.
+# Beside volumes there are panels of edges, and of slices; a volume may have edges over it.
 PANELS = @PANELS@
 # How many frames the animations have, and how many of them a second; None if there is no animation.
 FRAMES = @FRAMES@
@@ -39,6 +40,9 @@ SIZE = @SIZE@
 COLOR_BY = @COLOR_BY@
 # Whether a colour bar stands in the last view.
 COLORBAR = @COLORBAR@
+# How edges are drawn: the array that colours them, hidden parts ('thin', 'leave_out' or 'same'), the radius of tubes (None:
+# as fits the picture), and how opaque the skins are that they are drawn over.
+TUBES = @TUBES@
 # From where the volumes are seen, against the middle of the image; +y is up.
 CAMERA = (1.0, 0.72, 1.45)
 # The colours of outlines and of text.
@@ -388,10 +392,197 @@ def show_image(panel, reader, array, v, aspect):
     place_parallel(v, [bounds[0], bounds[1], bounds[2], bounds[3] + room], aspect)
 
 
+# -------------------------------------------------------------------------------------------------- edges and slices
+
+# The radius of tubes as a share of the diagonal of what is shown, and of hidden ones as a share of that.
+TUBE, THIN = 0.003, 0.4
+PALE, INK = (0.78, 0.78, 0.78), (0.2, 0.2, 0.2)
+# What is near is dark; below and above the middle of w there are two hues. Both are told apart in grey too.
+RAMPS = {'depth': ((0.0, 0.04, 0.09, 0.27), (0.5, 0.16, 0.42, 0.66), (1.0, 0.68, 0.83, 0.93)),
+         'w': ((0.0, 0.05, 0.16, 0.45), (0.5, 0.50, 0.47, 0.48), (1.0, 0.93, 0.56, 0.10))}
+# The colours of several slices or objects, from the first on and around again.
+TINTS = ((0.55, 0.71, 0.86), (0.96, 0.76, 0.48), (0.66, 0.82, 0.62), (0.90, 0.62, 0.60), (0.76, 0.68, 0.86),
+         (0.93, 0.88, 0.55))
+# The ranges of what tubes are coloured by, over all panels.
+RANGES = {}
+
+# Tints, darkened by ambient occlusion where it is known, and normals that are split at edges.
+SLICE_SKIN = '''
+import numpy
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
+split = vtkPolyDataNormals()
+split.SetInputData(self.GetInputDataObject(0, 0))
+split.SetFeatureAngle(40.0)
+split.Update()
+out = self.GetOutputDataObject(0)
+out.ShallowCopy(split.GetOutput())
+arrays, count = out.GetPointData(), out.GetNumberOfPoints()
+if count:
+    number = vtk_to_numpy(arrays.GetArray('object')).astype(int) - 1 if NUMBER is None else numpy.full(count, NUMBER)
+    colours = numpy.array(TINTS)[number % len(TINTS)]
+    if arrays.HasArray('ambient_occlusion'):
+        colours = colours * vtk_to_numpy(arrays.GetArray('ambient_occlusion'))[:, None]
+    kept = numpy_to_vtk((255 * numpy.clip(colours, 0, 1) + 0.5).astype(numpy.uint8), deep=1)
+    kept.SetName('rgb')
+    arrays.AddArray(kept)
+'''
+
+
+def is_volume(panel):
+    return 'kind' not in panel
+
+
+def light_view(v):
+    """One white light that goes with the camera, a little above it; ParaView's own three are tinted."""
+    v.UseLight = 0
+    light = AddLight(view=v)
+    setp(light, Coords='Camera', Type='Directional', Position=[-0.25, 0.6, 1.0], FocalPoint=[0.0, 0.0, 0.0],
+         Intensity=1.0, DiffuseColor=[1.0, 1.0, 1.0])
+
+
+def read_polydata(name):
+    reader = XMLPolyDataReader(registrationName=name, FileName=[locate_file(name)])
+    setp(reader, TimeArray='None')
+    reader.UpdatePipeline()
+    return reader
+
+
+def is_filled(source):
+    return source.GetDataInformation().GetNumberOfCells() > 0
+
+
+def tubes_of(lines, name, radius):
+    tube = Tube(registrationName=name, Input=lines)
+    setp(tube, Scalars=['POINTS', ''], Vectors=['POINTS', ''], NumberofSides=12, Capping=1, Radius=radius)
+    return tube
+
+
+def part_of(reader, name, seen):
+    """The lines that are seen, or those that are hidden."""
+    part = Threshold(registrationName=name, Input=reader)
+    part.Scalars = ['CELLS', 'visible']
+    part.LowerThreshold, part.UpperThreshold = (0.5, 1.5) if seen else (-0.5, 0.5)
+    lines = ExtractSurface(registrationName=name + ', lines', Input=part)
+    lines.UpdatePipeline()
+    return lines
+
+
+def show_tubes(name, box, v):
+    """The edges in a file as tubes; returns the array that colours them."""
+    reader, stem = read_polydata(name), os.path.splitext(name)[0]
+    if not is_filled(reader):
+        return None
+    radius = TUBES['radius'] or TUBE * math.sqrt(total((box[2 * a + 1] - box[2 * a]) ** 2 for a in range(3)))
+    parts = [(reader, '', radius, True)]
+    if TUBES['hidden'] != 'same' and 'visible' in reader.CellData.keys():
+        parts = [(part_of(reader, stem + ': seen', True), '', radius, True)]
+        if TUBES['hidden'] == 'thin':
+            parts.append((part_of(reader, stem + ': hidden', False), ', hidden', THIN * radius, False))
+    # Stereographic projections have no depth.
+    array = TUBES['color_by']
+    if array not in reader.PointData.keys():
+        array = 'w' if array and 'w' in reader.PointData.keys() else None
+    for lines, text, size, seen in parts:
+        if not is_filled(lines):
+            continue
+        d = Show(tubes_of(lines, stem + ': tubes' + text, size), v)
+        d.SetRepresentationType('Surface')
+        setp(d, Ambient=0.45, Diffuse=0.6, Specular=0.0, Interpolation='Gouraud')
+        if array and seen:
+            low, high = reader.PointData[array].GetRange()
+            before = RANGES.get(array, (low, high))
+            RANGES[array] = (smallest(low, before[0]), largest(high, before[1]))
+            d.ColorArrayName, d.LookupTable, d.MapScalars = ['POINTS', array], GetColorTransferFunction(array), 1
+        else:
+            d.ColorArrayName = ['POINTS', '']
+            setp(d, AmbientColor=INK if seen else PALE, DiffuseColor=INK if seen else PALE)
+    return array
+
+
+def finish_tubes(shown):
+    """The ranges of colours, and a bar beside the first panel of each; `shown` has an array and a view for each panel."""
+    for array, (low, high) in RANGES.items():
+        if not high > low:
+            low, high = low - 0.5, high + 0.5
+        points = [v for x, r, g, b in RAMPS[array] for v in (low + x * (high - low), r, g, b)]
+        setp(GetColorTransferFunction(array), AutomaticRescaleRangeMode='Never', ColorSpace='RGB', RGBPoints=points,
+             ScalarRangeInitialized=1.0)
+        v = [view for name, view in shown if name == array][0]
+        bar, size = GetScalarBar(GetColorTransferFunction(array), v), text_size()
+        setp(bar, Title=array, ComponentTitle='', TitleColor=TEXT, LabelColor=TEXT, TitleFontFamily='Arial',
+             LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0,
+             LabelFormat='%.2f', RangeLabelFormat='%.2f', UseCustomLabels=1, CustomLabels=[(low + high) / 2],
+             ScalarBarThickness=int(0.6 * size), ScalarBarLength=0.3, Orientation='Vertical')
+        for place in ('Any Location', 'AnyLocation'):
+            try:
+                bar.WindowLocation = place
+                break
+            except ValueError:
+                pass
+        setp(bar, Position=[0.885, 0.06], Visibility=1)
+
+
+def show_edges(panel, box, v, aspect):
+    """A panel of edges alone; flat ones straight on."""
+    if box is None:
+        reader = read_polydata(panel['file'])
+        box = list(reader.GetDataInformation().GetBounds()) if is_filled(reader) else [-1.0, 1.0] * 3
+        Delete(reader)
+    light_view(v)
+    array = show_tubes(panel['file'], box, v)
+    if is_image(panel):
+        place_parallel(v, [box[0], box[1], box[2], box[3] + 0.08 * (box[3] - box[2])], aspect)
+    else:
+        place_camera(v, box, aspect, 0.05)
+    return array
+
+
+def show_slices_alone(panel, v, aspect):
+    """Surfaces that lie in one space, cut open as the volumes are; several have a colour each."""
+    readers = [read_polydata(name) for name in panel['files']]
+    filled = [(k, reader) for k, reader in enumerate(readers) if is_filled(reader)]
+    light_view(v)
+    if not filled:
+        return
+    box = union_of([reader.GetDataInformation().GetBounds() for _, reader in filled])
+    for k, reader in filled:
+        name = os.path.splitext(panel['files'][k])[0]
+        flat = reader.GetDataInformation().GetBounds()
+        skin = ProgrammableFilter(registrationName=name + ': skin', Input=reader)
+        skin.Script = 'NUMBER, TINTS = %r, %r\n' % (k if len(readers) > 1 else None, TINTS) + SLICE_SKIN
+        shown = skin
+        if CUT is not None:
+            shown = Clip(registrationName=name + ': cut', Input=skin)
+            centre = middle_of(box)
+            if CUT[0] == 'plane':
+                centre[CUT[1]] = CUT[2]
+                shown.ClipType = 'Plane'
+                setp(shown.ClipType, Origin=centre, Normal=[float(a == CUT[1]) for a in range(3)])
+                setp(shown, Invert=1)
+            else:
+                shown.ClipType = 'Box'
+                centre = list(CUT[1]) if CUT[1] is not None else centre
+                length = [1.02 * largest(box[2 * a + 1] - centre[a], 0.0) + 1e-6 for a in range(3)]
+                setp(shown.ClipType, UseReferenceBounds=0, Position=centre, Translation=centre, Length=length)
+                setp(shown, Invert=0, Exact=1)
+            HideInteractiveWidgets(shown.ClipType)
+        d = Show(shown, v)
+        d.SetRepresentationType('Surface')
+        if COLOR_BY == 'ambient_occlusion' and 'ambient_occlusion' in reader.PointData.keys():
+            colour_by(d, 'POINTS', 'rgb')
+        else:
+            d.ColorArrayName, d.LookupTable, d.MapScalars = ['POINTS', 'rgb'], GetColorTransferFunction('rgb'), 0
+        setp(d, Ambient=0.5, Diffuse=0.5, Specular=0.0, Interpolation='Gouraud')
+        if flat[5] == flat[4]:  # outlines of 3D scenes
+            setp(d, LineWidth=3.0)
+    place_camera(v, box, aspect, 0.05)
+
+
 @LOOK@# ------------------------------------------------------------------------------------------------------------ figure
 
 def is_image(panel):
-    return panel['dimensions'][2] == 1
+    return 'dimensions' in panel and panel['dimensions'][2] == 1
 
 
 def panel_grid():
@@ -489,33 +680,51 @@ def build_figure():
     shape = (size[0] / columns) / (size[1] / rows)
 
     prepare_colours()
-    readers = [read_panel(panel) for panel in PANELS]
+    readers = [read_panel(panel) for panel in PANELS if is_volume(panel)]
     if FRAMES:
         prepare_time()
-    arrays = [colour_array(reader, panel) for reader, panel in zip(readers, PANELS)]
+    volumes = [panel for panel in PANELS if is_volume(panel)]
+    arrays = [colour_array(reader, panel) for reader, panel in zip(readers, volumes)]
     layout = CreateLayout(name='Figure')
     cells = [cell for row in split_cell(layout, 0, rows, False) for cell in split_cell(layout, row, columns, True)]
     views = []
     for panel, cell in zip(PANELS, cells):
         views.append(make_view(panel['caption'] or panel['file'], is_image(panel)))
         AssignViewToLayout(view=views[-1], layout=layout, hint=cell)
-    everything = list(zip(PANELS, readers, arrays, views))
+    of_volumes = [v for panel, v in zip(PANELS, views) if is_volume(panel)]
+    everything = list(zip(volumes, readers, arrays, of_volumes))
     solids = [one for one in everything if not is_image(one[0])]
     for panel, reader, array, v in everything:
         if is_image(panel):
             show_image(panel, reader, array, v, shape)
+    box, seen = None, []
     if solids:
         panels, files, colours, seen = [list(column) for column in zip(*solids)]
-        show_solids(panels, files, colours, seen, centre_of(panels, files), shape)
+        box = show_solids(panels, files, colours, seen, centre_of(panels, files), shape)
         for panel, v in zip(panels[1:], seen[1:]):  # turning one volume turns them all
             AddCameraLink(seen[0], v, 'camera of ' + (panel['caption'] or panel['file']))
         SetActiveView(seen[0])
+    tubes = []
+    for panel, v in zip(PANELS, views):
+        if 'edges' in panel:
+            around = grid_bounds(panel) if is_image(panel) else box
+            tubes.append((show_tubes(panel['edges'], around, v), v))
+        elif not is_volume(panel) and panel['kind'] == 'edges':
+            own = 'dimensions' in panel
+            around = (grid_bounds(panel) if is_image(panel) else box) if own else None
+            tubes.append((show_edges(panel, around, v, shape), v))
+            if own and seen and not is_image(panel):
+                AddCameraLink(seen[0], v, 'camera of ' + (panel['caption'] or panel['file']))
+        elif not is_volume(panel):
+            show_slices_alone(panel, v, shape)
+    finish_tubes(tubes)
     for panel, v in zip(PANELS, views):
         if panel['caption']:
             show_caption(panel['caption'], v)
     show_bar(views[-1])
     layout.SetSize(layout_size())
-    SetActiveSource(readers[0])
+    if readers:
+        SetActiveSource(readers[0])
     return layout, size
 
 

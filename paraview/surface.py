@@ -262,17 +262,16 @@ def show_solids(panels, readers, arrays, views, centre, shape):
     if CUT is not None:
         link_cuts(cuts)
     labels = [Text(registrationName='axis ' + axis, Text=axis) for axis in 'xyz']
-    for cut, name, v in zip(cuts, names, views):
+    for panel, cut, name, v in zip(panels, cuts, names, views):
         d = Show(smooth_skin(cut, name), v)
         d.SetRepresentationType('Surface')
         colour_by(d, 'POINTS', 'rgb')
         setp(d, Ambient=CALM, Diffuse=1.0 - CALM, Specular=0.0, Interpolation='Gouraud')
-        # One white light that goes with the camera, a little above it; ParaView's own three are tinted.
-        v.UseLight = 0
-        light = AddLight(view=v)
-        setp(light, Coords='Camera', Type='Directional', Position=[-0.25, 0.6, 1.0], FocalPoint=[0.0, 0.0, 0.0],
-             Intensity=1.0, DiffuseColor=[1.0, 1.0, 1.0])
+        if 'edges' in panel:
+            setp(d, Opacity=TUBES['skin'])
+        light_view(v)
         show_frame(box, labels, v)
         place_camera(v, box, shape, 0.05, 0.06 if COLORBAR else 0.0)
+    return box
 
 

@@ -117,5 +117,6 @@ def show_solids(panels, readers, arrays, views, centre, shape):
         show_boxes(panel, reader, array, centre, v)
         place_camera(v, whole, shape / (1.0 - SLICES), 0.07)
         show_slices(panel, reader, array, centre, s, shape / SLICES)
+    return whole
 
 

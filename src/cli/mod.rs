@@ -17,7 +17,6 @@ mod watch;
 use std::borrow::Cow;
 use std::ffi::OsString;
 use std::path::Path;
-use std::process::ExitCode;
 
 use ao4d::pipeline::RunError;
 use ao4d::text::for_terminal;
@@ -110,20 +109,23 @@ fn existing(file: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Parses the command line and does what it says.
-pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Parses the command line, does what it says, and returns the exit code.
+///
+/// The first argument is the program's own name. Whoever embeds the program, such as its Python package, hands the rest in.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(refusal) => {
             // Help and version come this way too, with code 0. A closed pipe is no reason to fail. A refusal quotes
             // arguments, among them names of files; where a terminal would obey one, it goes without colours.
             let commands = |argument: OsString| matches!(for_terminal(&argument.to_string_lossy()), Cow::Owned(_));
-            if std::env::args_os().any(commands) {
+            if arguments.into_iter().any(commands) {
                 console::to_stderr(refusal.to_string().trim_end());
             } else {
                 let _ = refusal.print();
             }
-            return ExitCode::from(u8::try_from(refusal.exit_code()).unwrap_or(2));
+            return u8::try_from(refusal.exit_code()).unwrap_or(2);
         }
     };
     let console = Console::new(cli.messages);
@@ -136,7 +138,7 @@ pub fn main() -> ExitCode {
         Verb::Devices(devices) => devices.execute(&console),
         Verb::Schema(schema) => schema.execute(&console),
     };
-    ExitCode::from(match result {
+    match result {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::Different) => 1,
         Err(Failure::Refused(error)) => {
@@ -151,7 +153,7 @@ pub fn main() -> ExitCode {
             watch::tell_interrupted(console.quiet());
             130
         }
-    })
+    }
 }
 
 #[cfg(test)]

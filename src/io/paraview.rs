@@ -49,6 +49,33 @@ pub struct Figure {
     pub color_by: ColorBy,
     /// Whether a colour bar of ambient occlusion stands in the last panel.
     pub colorbar: bool,
+    /// How edges are drawn, if there are any.
+    pub tubes: Option<Tubes>,
+}
+
+/// How edges are drawn: as tubes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tubes {
+    /// The array that gives them their colours; else they are dark grey. Edges without it take what they have.
+    pub color_by: Option<&'static str>,
+    /// How hidden parts are drawn.
+    pub hidden: Hidden,
+    /// Their radius; by default as fits the picture.
+    pub radius: Option<f64>,
+    /// How opaque the skins of bodies are that they are drawn over.
+    pub skin: f64,
+}
+
+/// How hidden parts of edges are drawn, which the array `visible` tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Hidden {
+    /// Thin and pale.
+    #[default]
+    Thin,
+    /// Not at all.
+    LeaveOut,
+    /// As the others.
+    Same,
 }
 
 /// How long animations are.
@@ -80,15 +107,32 @@ pub enum ColorBy {
     AmbientOcclusion,
 }
 
-/// One volume of a figure.
+/// What a panel shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// A volume.
+    #[default]
+    Volume,
+    /// Lines, as tubes.
+    Edges,
+    /// Surfaces.
+    Slices,
+}
+
+/// One panel of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
-    /// The file, relative to the state's folder.
-    pub file: String,
+    /// What it shows.
+    pub kind: Kind,
+    /// The files, relative to the state's folder; of a volume one.
+    pub files: Vec<String>,
     /// What stands above it; may be empty.
     pub caption: String,
-    /// Its dimensions and place. One layer along z makes it an image, shown straight on.
-    pub grid: Grid,
+    /// Dimensions and place of a volume, or of the volume that its edges belong to. One layer along z makes it an image,
+    /// shown straight on.
+    pub grid: Option<Grid>,
+    /// The edges that are drawn over a volume.
+    pub edges: Option<String>,
 }
 
 /// Which files a state reads.
@@ -181,6 +225,19 @@ fn constant(figure: &Figure, name: &str) -> String {
             ColorBy::AmbientOcclusion => "'ambient_occlusion'".into(),
         },
         "COLORBAR" => if figure.colorbar { "True" } else { "False" }.into(),
+        "TUBES" => figure.tubes.map_or("None".into(), |tubes| {
+            let color_by = tubes.color_by.map_or("None".into(), quoted);
+            let hidden = match tubes.hidden {
+                Hidden::Thin => "'thin'",
+                Hidden::LeaveOut => "'leave_out'",
+                Hidden::Same => "'same'",
+            };
+            let radius = tubes.radius.map_or("None".into(), number);
+            format!(
+                "{{'color_by': {color_by}, 'hidden': {hidden}, 'radius': {radius}, 'skin': {}}}",
+                number(tubes.skin)
+            )
+        }),
         "SIZE" => figure.size.map_or("None".into(), |[width, height]| format!("[{width}, {height}]")),
         other => format!("@{other}@"),
     }
@@ -189,12 +246,27 @@ fn constant(figure: &Figure, name: &str) -> String {
 /// The list of volumes, one a line.
 fn panels(panels: &[Panel]) -> String {
     let mut text = String::from("[\n");
-    for Panel { file, caption, grid } in panels {
-        let (file, caption) = (quoted(file), quoted(caption));
-        let (dimensions, origin, spacing) = (grid.dimensions, numbers(&grid.origin), numbers(&grid.spacing));
+    for Panel { kind, files, caption, grid, edges } in panels {
+        let caption = quoted(caption);
+        let file = files.first().map_or("''".into(), |file| quoted(file));
         // Writing to a `String` can't fail.
-        let _ = writeln!(text, "    {{'file': {file}, 'caption': {caption},");
-        let _ = writeln!(text, "     'dimensions': {dimensions:?}, 'origin': {origin}, 'spacing': {spacing}}},");
+        let _ = match kind {
+            Kind::Volume => write!(text, "    {{'file': {file}, 'caption': {caption}"),
+            Kind::Edges => write!(text, "    {{'kind': 'edges', 'file': {file}, 'caption': {caption}"),
+            Kind::Slices => {
+                let files: Vec<String> = files.iter().map(|file| quoted(file)).collect();
+                let files = files.join(", ");
+                write!(text, "    {{'kind': 'slices', 'file': {file}, 'files': [{files}], 'caption': {caption}")
+            }
+        };
+        if let Some(edges) = edges {
+            let _ = write!(text, ", 'edges': {}", quoted(edges));
+        }
+        if let Some(grid) = grid {
+            let (dimensions, origin, spacing) = (grid.dimensions, numbers(&grid.origin), numbers(&grid.spacing));
+            let _ = write!(text, ",\n     'dimensions': {dimensions:?}, 'origin': {origin}, 'spacing': {spacing}");
+        }
+        text.push_str("},\n");
     }
     text.push(']');
     text
@@ -236,7 +308,13 @@ mod tests {
 
     fn figure() -> Figure {
         let grid = Grid { dimensions: [50, 40, 30], origin: [-0.98, -0.5, 1.0 / 3.0], spacing: [0.04, 1e-7, 2.0] };
-        let panel = |file: &str, caption: &str| Panel { file: file.into(), caption: caption.into(), grid };
+        let panel = |file: &str, caption: &str| Panel {
+            kind: Kind::Volume,
+            files: vec![file.into()],
+            caption: caption.into(),
+            grid: Some(grid),
+            edges: None,
+        };
         Figure {
             title: "two".into(),
             program: "ao4d 0.1.0".into(),
@@ -249,6 +327,7 @@ mod tests {
             style: Style::Surface,
             color_by: ColorBy::Rgba,
             colorbar: false,
+            tubes: None,
         }
     }
 
@@ -269,6 +348,7 @@ mod tests {
         assert_eq!(line(&text, "CUT"), "CUT = None");
         assert_eq!(line(&text, "SCREENSHOT"), "SCREENSHOT = 'figure.png'");
         assert_eq!(line(&text, "SIZE"), "SIZE = None");
+        assert_eq!(line(&text, "TUBES"), "TUBES = None");
         assert_eq!((line(&text, "FRAMES"), line(&text, "RATE")), ("FRAMES = None".into(), "RATE = None".into()));
         assert_eq!(line(&text, "COLOR_BY"), "COLOR_BY = 'rgba'");
         assert_eq!(line(&text, "COLORBAR"), "COLORBAR = False");
@@ -295,6 +375,21 @@ mod tests {
         assert_eq!(line(&text, "SCREENSHOT"), "SCREENSHOT = None");
         assert_eq!(line(&text, "SIZE"), "SIZE = [640, 480]");
 
+        let edges = Panel { kind: Kind::Edges, files: vec!["e.vtp".into()], grid: None, ..figure.panels[1].clone() };
+        let files = vec!["a.vtp".into(), "b.vtp".into()];
+        let slices = Panel { kind: Kind::Slices, files, edges: None, ..edges.clone() };
+        figure.panels[0].edges = Some("e.vtp".into());
+        figure.panels.extend([edges, slices]);
+        figure.tubes = Some(Tubes { color_by: Some("w"), hidden: Hidden::LeaveOut, radius: None, skin: 0.5 });
+        let text = state(&figure);
+        assert!(text.contains("{'file': 'with.vti', 'caption': 'with', 'edges': 'e.vtp',\n     'dimensions'"));
+        assert!(text.contains("    {'kind': 'edges', 'file': 'e.vtp', 'caption': ''},\n"));
+        assert!(
+            text.contains("    {'kind': 'slices', 'file': 'a.vtp', 'files': ['a.vtp', 'b.vtp'], 'caption': ''},\n")
+        );
+        let tubes = "TUBES = {'color_by': 'w', 'hidden': 'leave_out', 'radius': None, 'skin': 0.5}";
+        assert_eq!(line(&text, "TUBES"), tubes);
+
         figure.cut = Cut::Octant { corner: None };
         assert_eq!(line(&state(&figure), "CUT"), "CUT = ('octant', None)");
         figure.cut = Cut::Octant { corner: Some([0.0, f64::NAN, -1e300]) };
@@ -313,7 +408,7 @@ mod tests {
     fn strange_names_stay_strings() {
         let mut figure = figure();
         figure.title = "a\nimport os".into();
-        figure.panels[0].file = "it's \\ \"x\".vti".into();
+        figure.panels[0].files[0] = "it's \\ \"x\".vti".into();
         figure.panels[0].caption = "@SIZE@ \u{e9} \u{3b1} \u{1f600}\n".into();
         let text = state(&figure);
         assert!(text.is_ascii());

@@ -1,4 +1,4 @@
-//! Cross-sections: where a surface is cut by a hyperplane {x : n.x = c}.
+//! Cross-sections: where a surface is cut by a hyperplane {x : n.x = c}, or by another level set ([`Level`]).
 //!
 //! A simplex with corners on both sides has one face, or in 4D perhaps two, of the section; its points are where the
 //! hyperplane crosses the edges. Two simplices that share a facet share the crossings on it, so the section of a closed
@@ -85,6 +85,48 @@ impl<const D: usize> Hyperplane<D> {
     }
 }
 
+impl<const D: usize> Hyperplane<D> {
+    /// The point of the parallel hyperplane through the origin that has these coordinates.
+    pub fn point(&self, coordinates: [f64; 3]) -> Vector64<D> {
+        self.frame.iter().zip(coordinates).fold(Vector64::zeros(), |sum, (axis, x)| sum + axis * x)
+    }
+}
+
+/// A function on space; a section is where it is zero.
+pub trait Level<const D: usize>: Sync {
+    /// Its value, up to rounding.
+    fn value(&self, point: &Vector64<D>) -> f64;
+
+    /// Its value at a vertex, where its sign decides. Points that are the same have the same.
+    fn height(&self, point: &Vector<D>) -> f64 {
+        self.value(&widen(point))
+    }
+
+    /// How far its zero is on the way between two points at which it is `heights`, of different signs.
+    fn share(&self, _ends: [Vector64<D>; 2], heights: [f64; 2]) -> f64 {
+        heights[0] / (heights[0] - heights[1])
+    }
+
+    /// Whether its faces are to run the other way round.
+    fn mirrored(&self) -> bool {
+        false
+    }
+}
+
+impl<const D: usize> Level<D> for Hyperplane<D> {
+    fn value(&self, point: &Vector64<D>) -> f64 {
+        self.normal.dot(point) - self.at
+    }
+
+    fn height(&self, point: &Vector<D>) -> f64 {
+        Hyperplane::height(self, point)
+    }
+
+    fn mirrored(&self) -> bool {
+        self.mirrored
+    }
+}
+
 /// A point of a section: on the edge between two vertices of a mesh, or a vertex that lies in the hyperplane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
@@ -129,8 +171,9 @@ pub struct Section {
 }
 
 /// A section in the making.
-struct Cut<'a, const D: usize> {
+struct Cut<'a, const D: usize, L: ?Sized> {
     mesh: &'a Mesh<D>,
+    level: &'a L,
     heights: Vec<f64>,
     /// The first vertex of the same object that is the same point with the same value.
     same: Vec<u32>,
@@ -140,15 +183,15 @@ struct Cut<'a, const D: usize> {
 
 /// Cuts a mesh. Its objects stay apart, and points that are the same for geometry are two where the vertices' `values`, if
 /// there are any, tell them apart: the sides of a crease.
-pub fn section<const D: usize>(mesh: &Mesh<D>, plane: &Hyperplane<D>, values: Option<&[f32]>) -> Section {
-    let heights = mesh.vertices.par_iter().map(|point| plane.height(point)).collect();
+pub fn section<const D: usize>(mesh: &Mesh<D>, level: &(impl Level<D> + ?Sized), values: Option<&[f32]>) -> Section {
+    let heights = mesh.vertices.par_iter().map(|point| level.height(point)).collect();
     let same = same_points(mesh, values);
-    let mut cut = Cut { mesh, heights, same, numbers: HashMap::new(), made: Section::default() };
+    let mut cut = Cut { mesh, level, heights, same, numbers: HashMap::new(), made: Section::default() };
     // Faces within the hyperplane, by the places of their corners: they may lie there twice.
     let mut within: Vec<([u32; 3], bool, [u32; 3])> = Vec::new();
     for (index, object) in mesh.objects.iter().enumerate() {
         for simplex in &mesh.simplices[object.simplices.clone()] {
-            for face in cut.faces(simplex, index as u32, plane.mirrored).into_iter().flatten() {
+            for face in cut.faces(simplex, index as u32, level.mirrored()).into_iter().flatten() {
                 let ends = cut.places(&face);
                 if ends[..D - 1].iter().all(|(from, to)| from == to) {
                     let mut places = ends.map(|(from, _)| from);
@@ -185,7 +228,7 @@ fn same_points<const D: usize>(mesh: &Mesh<D>, values: Option<&[f32]>) -> Vec<u3
     same
 }
 
-impl<const D: usize> Cut<'_, D> {
+impl<const D: usize, L: Level<D> + ?Sized> Cut<'_, D, L> {
     /// The faces of one simplex, none without measure.
     fn faces(&mut self, simplex: &[u32; D], object: u32, mirrored: bool) -> [Option<[u32; 3]>; 2] {
         let above = simplex.map(|v| self.heights[v as usize] >= 0.0);
@@ -245,8 +288,9 @@ impl<const D: usize> Cut<'_, D> {
         let next = self.made.points.len() as u32;
         let number = *self.numbers.entry((from, to)).or_insert(next);
         if number == next {
-            let [start, end] = [from, to].map(|v| self.heights[v as usize]);
-            let share = if from == to { 0.0 } else { start / (start - end) };
+            let heights = [from, to].map(|v| self.heights[v as usize]);
+            let ends = [from, to].map(|v| widen(&self.mesh.vertices[v as usize]));
+            let share = if from == to { 0.0 } else { self.level.share(ends, heights) };
             self.made.points.push(Crossing { from, to, share, object });
         }
         number

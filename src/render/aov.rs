@@ -210,12 +210,25 @@ fn byte(x: f32) -> u8 {
 }
 
 /// N numbers a voxel, on all cores.
-fn per_voxel<T: Send, const N: usize, const D: usize>(
+fn per_voxel<T: Copy + Default + Send, const N: usize, const D: usize>(
     buffer: &GBuffer<D>,
     value: impl Fn(&GBuffer<D>, usize) -> [T; N] + Sync,
 ) -> Vec<T> {
-    let tuples: Vec<[T; N]> = (0..buffer.len()).into_par_iter().with_min_len(4096).map(|i| value(buffer, i)).collect();
-    tuples.into_flattened()
+    let mut values = vec![T::default(); buffer.len() * N];
+    in_blocks(&mut values, BLOCK * N, &|block, values| {
+        let tuples = values.as_chunks_mut::<N>().0;
+        tuples.iter_mut().zip(block * BLOCK..).for_each(|(tuple, voxel)| *tuple = value(buffer, voxel));
+    });
+    values
+}
+
+/// Voxels that one core takes at a time.
+const BLOCK: usize = 4096;
+
+/// Fills an array block by block, on all cores. It knows nothing of what fills it, so that the compiler makes this, which is long,
+/// once a type and not once an array.
+fn in_blocks<T: Send>(values: &mut [T], size: usize, fill: &(dyn Fn(usize, &mut [T]) + Sync)) {
+    values.par_chunks_mut(size).enumerate().for_each(|(block, values)| fill(block, values));
 }
 
 #[cfg(test)]

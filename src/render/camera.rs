@@ -252,6 +252,15 @@ impl<const D: usize> Camera<D> {
         Vector64::from_fn(|r, _| axes[r].dot(direction))
     }
 
+    /// The direction that has these parts along the axes of the camera's frame.
+    pub(super) fn from_frame(&self, parts: &Vector<D>) -> Vector<D> {
+        let axes = match Dimension::of::<D>() {
+            Dimension::Three => [&self.right, &self.up, &self.back, &self.back],
+            Dimension::Four => [&self.right, &self.up, &self.over, &self.back],
+        };
+        narrow(&(0..D).fold(Vector64::zeros(), |sum, r| sum + axes[r] * f64::from(parts[r])))
+    }
+
     /// Whether rays are parallel.
     pub(super) fn is_parallel(&self) -> bool {
         matches!(self.projection, Projection::Parallel { .. })

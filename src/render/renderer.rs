@@ -15,6 +15,7 @@ use super::{
     screen_space, visibility,
 };
 use crate::accel::Tracer;
+use crate::geometry::Vector64;
 use crate::occlusion::Error;
 use crate::progress::{Progress, Uncounted};
 use crate::trace::cpu::CpuBackend;
@@ -110,7 +111,7 @@ impl<const D: usize> Renderer<D> {
         let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
         let columns = self.columns(aovs);
         let depth_image = match self.shading {
-            Shading::ScreenSpace(settings) => Some(self.depth_image(settings, progress)?),
+            Shading::ScreenSpace(settings) => Some(self.depth_image(settings, columns, progress)?),
             _ => None,
         };
         let pass = SurfacePass {
@@ -193,8 +194,44 @@ impl<const D: usize> Renderer<D> {
         Ok(Volume { grid: self.grid, arrays, field_data: Vec::new() })
     }
 
-    /// What the voxels' centres see, as far as screen space looks at it; made slab by slab too.
-    fn depth_image(&self, settings: ScreenSpace, progress: &dyn Progress) -> Result<DepthImage<D>, Error> {
+    /// What the voxels' centres see, as far as screen space looks at it for these columns; made slab by slab too.
+    fn depth_image(
+        &self,
+        settings: ScreenSpace,
+        columns: Columns,
+        progress: &dyn Progress,
+    ) -> Result<DepthImage<D>, Error> {
+        let mut distances = Vec::with_capacity(self.grid.len());
+        self.centres(Columns::SIMPLEX | Columns::DEPTH, progress, |slab| {
+            distances.extend(slab.depth);
+            Ok(())
+        })?;
+        let mut image = DepthImage::new(&self.camera, &self.grid, distances, settings);
+        let is_lit = columns.contains(Columns::HIDDEN);
+        if is_lit || columns.contains(Columns::DIRECTION) {
+            image = image.directed();
+        }
+        if !is_lit {
+            return Ok(image);
+        }
+        // Light goes from what is seen to what is seen, so where it comes from is found for all voxels first.
+        let gradient = self.skylight.as_deref().map_or_else(Vector64::zeros, |skylight| skylight.gradient);
+        let mut light = Vec::with_capacity(self.grid.len());
+        self.centres(screen_space::COLUMNS | Columns::DIRECTION, progress, |mut slab| {
+            screen_space::occlude(&image, &mut slab, progress)?;
+            light.extend(screen_space::radiosity(self.tracer().mesh(), &slab, &gradient));
+            Ok(())
+        })?;
+        Ok(image.lit(light))
+    }
+
+    /// What the voxels' centres see, without occlusion, slab by slab.
+    fn centres(
+        &self,
+        columns: Columns,
+        progress: &dyn Progress,
+        mut sink: impl FnMut(GBuffer<D>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let sampling = Sampling::new(&self.camera, &self.grid, 1);
         let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
         let pass = SurfacePass {
@@ -206,16 +243,13 @@ impl<const D: usize> Renderer<D> {
             lighting: None,
             skylight: None,
         };
-        let columns = Columns::SIMPLEX | Columns::DEPTH;
         let [_, _, layers] = self.grid.dimensions;
         let voxel = columns.bytes::<D>() + size_of::<u32>();
         let thickness = (SLAB_BYTES / voxel / self.grid.layer_len().max(1)).clamp(1, layers);
-        let mut distances = Vec::with_capacity(self.grid.len());
         for first in (0..layers).step_by(thickness) {
-            let slab = pass.layers(first..layers.min(first + thickness), columns, &Uncounted(progress))?;
-            distances.extend(slab.depth);
+            sink(pass.layers(first..layers.min(first + thickness), columns, &Uncounted(progress))?)?;
         }
-        Ok(DepthImage::new(&self.camera, &self.grid, distances, settings))
+        Ok(())
     }
 
     /// The columns that arrays and filters need.

@@ -251,6 +251,7 @@ impl<const D: usize> SurfacePass<'_, D> {
             normal: if side == 0.0 { facing } else { interpolated * side.signum() },
             to_eye: widen(&unit(&-widen(&hit.ray.direction))),
             reflectance,
+            gloss: mesh.objects[mesh.object_of(hit.simplex)].gloss,
         }
     }
 }

@@ -37,6 +37,7 @@ pub mod polytope;
 pub mod product;
 mod products;
 mod simplices;
+mod slab;
 mod spin;
 mod transform;
 mod twin;
@@ -55,6 +56,7 @@ pub use object::{
 pub use polytope::PolytopeSpec;
 pub use products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 pub use simplices::SimplicesSpec;
+pub use slab::SlabSpec;
 pub use spin::SpinSpec;
 pub use transform::{RotateSpec, TransformStep, plane_of, sine_cosine};
 pub use twin::{place, plane, twin};

@@ -15,13 +15,14 @@ use super::numbers::{AXES, only_in};
 use super::polytope::PolytopeSpec;
 use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpec};
 use super::simplices::SimplicesSpec;
+use super::slab::SlabSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
 use super::{Error, file};
 use crate::geometry::Dimension;
 use crate::mesh::corners::DEFAULT_ANGLE;
 use crate::mesh::rounding::turned_over;
-use crate::mesh::{Crease, Surface};
+use crate::mesh::{Crease, Gloss, Surface};
 use crate::progress::{Progress, Silent};
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
@@ -77,6 +78,9 @@ pub struct ObjectSpec {
     /// Shape: the product of a disc and a rectangle.
     #[serde(default)]
     pub cubinder: Option<CubinderSpec>,
+    /// What of it is kept: the part between two parallel hyperplanes, before it is placed. What was closed is closed again.
+    #[serde(default)]
+    pub slab: Option<SlabSpec>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -88,6 +92,14 @@ pub struct ObjectSpec {
     #[serde(default)]
     #[schemars(range(min = 0, max = 1))]
     pub opacity: Option<f64>,
+    /// The share of lights that the object reflects in highlights, 0 to 1 (default what the render says).
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1))]
+    pub specular: Option<f64>,
+    /// The exponent of its highlights: the higher, the smaller they are (default what the render says).
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub shininess: Option<f64>,
     /// Which way the surface faces: `input` (default), open surfaces by the order of their vertices, closed ones outwards; or
     /// `eye`, where it is seen from by the first render of the scene, so that a closed surface around the eye is a room.
     #[serde(default)]
@@ -283,6 +295,18 @@ impl ObjectSpec {
         }
     }
 
+    /// How it reflects lights, where that is not left to the picture.
+    pub fn gloss(&self) -> Result<Gloss, Error> {
+        let within = |key: &str, found: Option<f64>, least: f64, most: f64| match found {
+            Some(x) if !(least..=most).contains(&x) => {
+                Err(Error::invalid(key, format!("expected a number from {least} to {most}, found {x}")))
+            }
+            found => Ok(found),
+        };
+        let specular = within("specular", self.specular, 0.0, 1.0)?;
+        Ok(Gloss { specular, shininess: within("shininess", self.shininess, 1.0, 1e6)? })
+    }
+
     /// Where the object's vertices are split.
     pub fn crease(&self) -> Result<Crease, Error> {
         Ok(match (self.crease_angle, self.shape()?) {
@@ -323,7 +347,11 @@ pub fn build_object_watched<const D: usize>(
     let shape = spec.shape()?;
     spec.color.rgb()?;
     spec.surface_opacity()?;
+    spec.gloss()?;
     let mut surface = shape.build::<D>(folder, notes, progress)?;
+    if let Some(slab) = &spec.slab {
+        surface = slab.cut(surface, progress)?;
+    }
     let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;
     check_single_precision(&surface, if spec.transform.is_empty() { shape.key() } else { "transform" })?;

@@ -42,6 +42,9 @@ pub fn twin(object: &ObjectSpec) -> Result<ObjectSpec, Error> {
     let ObjectSpec { name, color, orientation, crease_angle, .. } = object.clone();
     let mut twin = ObjectSpec { name, color, orientation, crease_angle, ..ObjectSpec::default() };
     let shape = object.shape()?;
+    if object.slab.is_some() {
+        return Err(Error::invalid("slab", "a thick slice has no twin in 3D; take `slab` out, or `twin`"));
+    }
     match shape {
         Shape::Box(spec) => {
             let (min, max) = (point::<4>("box.min", &spec.min)?, point::<4>("box.max", &spec.max)?);

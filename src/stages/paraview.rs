@@ -1,4 +1,5 @@
-//! `paraview`: a ParaView state (a Python file) that shows images and animations side by side.
+//! `paraview`: a ParaView state (a Python file) that shows images and animations side by side, and beside or over them
+//! wireframes as tubes, and slices.
 //!
 //! It works on files alone: which ones, and where in them the voxels are, is known without making any. A figure of
 //! animations has time: ParaView plays it, and run without a display the state writes a picture a frame, and a film of them.
@@ -13,9 +14,11 @@ use super::animate::AnimatePlan;
 use super::camera::camera;
 use super::cut::{Axis, Cut};
 use super::describe::Counts;
-use super::range::check_length;
+use super::range::{check_length, positive};
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
+use super::slice::SlicePlan;
+use super::wireframe::WireframePlan;
 use super::write::{Format, PROGRAM, WritePlan, write_whole};
 use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError};
 use crate::geometry::Dimension;
@@ -24,15 +27,20 @@ use crate::render::Aov;
 use crate::text::number;
 use crate::volume::Grid;
 
+/// How opaque skins are below tubes, where nothing else is said.
+const SKIN: f64 = 0.3;
+
 /// A ParaView state (a Python file) that shows images side by side.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct ParaviewSpec {
     /// A name for messages.
     pub id: Option<String>,
-    /// The images, from left to right, by the id of their render or write, or of an animation (default: the nearest earlier
-    /// write or animation).
+    /// What it shows, from left to right: images, by the id of their render or write, animations, wireframes and slices
+    /// (default: the nearest earlier write or animation).
     pub input: Option<OneOrMany>,
+    /// How the edges of wireframes are drawn, and which are drawn over images.
+    pub edges: Option<EdgesSpec>,
     /// The state: `NAME.py`.
     pub state: String,
     /// The picture that the state writes when it is run: `NAME.png`. Of animations it is the first frame; all of them are
@@ -50,6 +58,65 @@ pub struct ParaviewSpec {
     pub color_by: Option<ColorBy>,
     /// Whether a colour bar of ambient occlusion stands in the last panel (default: with `color_by: ambient_occlusion`).
     pub colorbar: Option<bool>,
+}
+
+/// How a figure draws the edges of wireframes: as tubes.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct EdgesSpec {
+    /// The wireframe that is drawn over the images of its render, by its id; `none` draws none there (default: the nearest
+    /// earlier one, unless `input` has a wireframe).
+    pub over: Option<String>,
+    /// What gives tubes their colour (default `depth`, or what there is).
+    pub color_by: Option<EdgeColor>,
+    /// How parts are drawn that something hides (default `thin`).
+    pub hidden: Option<HiddenEdges>,
+    /// The radius of tubes, in the units of the image (default: as fits the picture).
+    pub radius: Option<f64>,
+    /// How opaque the skins of bodies are that tubes are drawn over, 0 to 1 (default 0.3; only with `style: surface`).
+    #[schemars(range(min = 0, max = 1))]
+    pub skin: Option<f64>,
+}
+
+/// What gives tubes their colour.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EdgeColor {
+    /// The distance from the eye: what is near is dark.
+    #[default]
+    Depth,
+    /// The fourth coordinate.
+    W,
+    /// Nothing: all are dark grey.
+    None,
+}
+
+/// How parts of edges are drawn that something hides.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HiddenEdges {
+    /// Thin and pale.
+    #[default]
+    Thin,
+    /// Not at all.
+    LeaveOut,
+    /// As the others.
+    Same,
+}
+
+/// How edges are drawn, as understood.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EdgesPlan {
+    /// What is drawn over images.
+    pub over: Option<Ref<WireframePlan>>,
+    /// What gives them their colour.
+    pub color_by: EdgeColor,
+    /// How hidden parts are drawn.
+    pub hidden: HiddenEdges,
+    /// The radius of tubes, where it was given.
+    pub radius: Option<f64>,
+    /// How opaque the skins below are.
+    pub skin: f64,
 }
 
 /// How a figure draws volumes.
@@ -95,25 +162,32 @@ impl Reader {
     }
 }
 
-/// What a panel of a figure shows. As JSON a write is its number, an animation `{animation: NUMBER}`.
+/// What a panel of a figure shows. As JSON a write is its number, another `{KIND: NUMBER}`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shown {
     /// An image.
     Image(Ref<WritePlan>),
     /// One that changes.
     Animation(Ref<AnimatePlan>),
+    /// Edges alone.
+    Wireframe(Ref<WireframePlan>),
+    /// Slices alone; those of a sequence together.
+    Slice(Ref<SlicePlan>),
 }
 
 impl Serialize for Shown {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = match self {
+            Self::Image(write) => return write.serialize(serializer),
+            _ => serializer.serialize_map(Some(1))?,
+        };
         match self {
-            Self::Image(write) => write.serialize(serializer),
-            Self::Animation(animation) => {
-                let mut map = serializer.serialize_map(Some(1))?;
-                map.serialize_entry("animation", animation)?;
-                map.end()
-            }
+            Self::Image(_) => {}
+            Self::Animation(animation) => map.serialize_entry("animation", animation)?,
+            Self::Wireframe(wireframe) => map.serialize_entry("wireframe", wireframe)?,
+            Self::Slice(slice) => map.serialize_entry("slice", slice)?,
         }
+        map.end()
     }
 }
 
@@ -123,14 +197,17 @@ impl Shown {
         match self {
             Self::Image(write) => write.index(),
             Self::Animation(animation) => animation.index(),
+            Self::Wireframe(wireframe) => wireframe.index(),
+            Self::Slice(slice) => slice.index(),
         }
     }
 
-    /// The render that it is of.
-    fn render(self, plan: &Plan) -> Ref<RenderPlan> {
+    /// The render that it is an image of.
+    fn render(self, plan: &Plan) -> Option<Ref<RenderPlan>> {
         match self {
-            Self::Image(write) => plan[write].render,
-            Self::Animation(animation) => plan[animation].render,
+            Self::Image(write) => Some(plan[write].render),
+            Self::Animation(animation) => Some(plan[animation].render),
+            Self::Wireframe(_) | Self::Slice(_) => None,
         }
     }
 
@@ -139,13 +216,14 @@ impl Shown {
         match self {
             Self::Image(write) => &plan[write].arrays,
             Self::Animation(animation) => &plan[animation].arrays,
+            Self::Wireframe(_) | Self::Slice(_) => &[],
         }
     }
 
     /// How many frames it has, and how many of them a second, if it changes.
     fn frames(self, plan: &Plan) -> Option<(usize, f64)> {
         match self {
-            Self::Image(_) => None,
+            Self::Image(_) | Self::Wireframe(_) | Self::Slice(_) => None,
             Self::Animation(animation) => Some((plan[animation].files.len(), plan[animation].rate)),
         }
     }
@@ -162,6 +240,8 @@ pub struct FigurePlan {
     pub screenshot: Option<PathBuf>,
     /// The film's, which the state makes of animations where ffmpeg is installed.
     pub film: Option<PathBuf>,
+    /// How it draws edges; none if it has none.
+    pub edges: Option<EdgesPlan>,
     /// Which files it reads.
     pub reader: Reader,
     /// How the volumes are cut open.
@@ -191,7 +271,7 @@ impl Stage for FigurePlan {
         let reader = spec.reader.unwrap_or_default();
         let writes = with_twins(shown(spec, path, reader.format(), resolver)?, resolver);
         if reader == Reader::Vti {
-            for &write in &writes {
+            for &write in writes.iter().filter(|shown| shown.render(&resolver.plan).is_some()) {
                 let arrays = write.arrays(&resolver.plan);
                 if !arrays.contains(&Aov::Rgba) || !arrays.contains(&Aov::Opacity) {
                     let id = &resolver.plan.stages[write.index()].id;
@@ -201,6 +281,7 @@ impl Stage for FigurePlan {
             }
         }
         check_frames(resolver, path, reader, &writes)?;
+        let edges = edges(spec, path, &writes, resolver)?;
         let (style, color_by) = (spec.style.unwrap_or_default(), spec.color_by.unwrap_or_default());
         if color_by == ColorBy::AmbientOcclusion {
             check_occlusion(resolver, path, reader, &writes)?;
@@ -244,11 +325,12 @@ impl Stage for FigurePlan {
         if let Cut::Plane(plane) = cut {
             check_length(&format!("{path}.cut.at"), plane.at)?;
         }
-        Ok(Self { writes, state, screenshot, film, reader, cut, size, style, color_by, colorbar })
+        Ok(Self { writes, state, screenshot, film, edges, reader, cut, size, style, color_by, colorbar })
     }
 
     fn works_on(&self) -> Vec<usize> {
-        self.writes.iter().map(|write| write.index()).collect()
+        let over = self.edges.and_then(|edges| edges.over).map(Ref::index);
+        self.writes.iter().map(|write| write.index()).chain(over).collect()
     }
 
     fn scene(_: Ref<Self>, _: &Plan) -> Option<Ref<ScenePlan>> {
@@ -301,7 +383,13 @@ fn shown(spec: &ParaviewSpec, path: &str, format: Format, resolver: &Resolver) -
     let mut writes = Vec::new();
     for (name, index) in ids.iter() {
         let at = format!("{path}.input{index}");
-        let stage = resolver.lookup(&at, name, &[RenderPlan::KIND, WritePlan::KIND, AnimatePlan::KIND])?;
+        let kinds = [RenderPlan::KIND, WritePlan::KIND, AnimatePlan::KIND, WireframePlan::KIND, SlicePlan::KIND];
+        let stage = resolver.lookup(&at, name, &kinds)?;
+        let wireframe = resolver.plan.reference(stage).map(Shown::Wireframe);
+        if let Some(shown) = wireframe.or(resolver.plan.reference(stage).map(Shown::Slice)) {
+            writes.push(shown);
+            continue;
+        }
         if let Some(animation) = resolver.plan.reference(stage) {
             writes.push(Shown::Animation(animation));
             continue;
@@ -329,10 +417,84 @@ fn with_twins(writes: Vec<Shown>, resolver: &Resolver) -> Vec<Shown> {
         let twin = match shown {
             Shown::Image(_) => Shown::Image(plan.reference(index)?),
             Shown::Animation(_) => Shown::Animation(plan.reference(index)?),
+            Shown::Wireframe(_) | Shown::Slice(_) => return None,
         };
         (!writes.contains(&twin)).then_some(twin)
     };
     writes.iter().flat_map(|&shown| twin(shown).into_iter().chain([shown])).collect()
+}
+
+/// How edges are drawn, and which are drawn over images; none if there are none.
+fn edges(
+    spec: &ParaviewSpec,
+    path: &str,
+    shown: &[Shown],
+    resolver: &mut Resolver,
+) -> Result<Option<EdgesPlan>, Invalid> {
+    let path = format!("{path}.edges");
+    let alone = shown.iter().any(|shown| matches!(shown, Shown::Wireframe(_)));
+    let Some(given) = &spec.edges else {
+        let usual =
+            EdgesPlan { over: None, color_by: EdgeColor::Depth, hidden: HiddenEdges::Thin, radius: None, skin: SKIN };
+        return Ok(alone.then_some(usual));
+    };
+    let plan = &resolver.plan;
+    let seen = |wireframe: Ref<WireframePlan>| plan[wireframe].render();
+    let over: Option<Ref<WireframePlan>> = match given.over.as_deref() {
+        Some("none") => None,
+        Some(name) => plan.reference(resolver.lookup(&format!("{path}.over"), name, &[WireframePlan::KIND])?),
+        None if alone => None,
+        None => {
+            let message = "there is no earlier `wireframe` that a camera sees; put one first";
+            Some(resolver.nearest(|w| seen(w).is_some()).ok_or_else(|| Invalid::new(&path, message))?)
+        }
+    };
+    if let Some(wireframe) = over {
+        let key = format!("{path}.over");
+        let id = plan.id(wireframe);
+        let Some(render) = seen(wireframe) else {
+            let message = format!("`{id}` is projected stereographically, as no image is; name it in `input`");
+            return Err(Invalid::new(key, message));
+        };
+        if !shown.iter().any(|&shown| matches!(shown, Shown::Image(_)) && shown.render(plan) == Some(render)) {
+            let message = format!(
+                "`{id}` is seen by `{}`, of which no image is shown here; add that to `input`",
+                plan.id(render)
+            );
+            return Err(Invalid::new(key, message));
+        }
+    }
+    let drawn = shown.iter().filter_map(|shown| match shown {
+        Shown::Wireframe(wireframe) => Some(*wireframe),
+        _ => None,
+    });
+    let drawn: Vec<Ref<WireframePlan>> = drawn.chain(over).collect();
+    if drawn.is_empty() {
+        resolver.warn(path, "has no use where no edges are drawn");
+        return Ok(None);
+    }
+    let flat = |w: &Ref<WireframePlan>| plan[plan[*w].scene].dimension == Dimension::Three;
+    if given.color_by == Some(EdgeColor::W)
+        && let Some(wireframe) = drawn.iter().find(|w| flat(w))
+    {
+        let message = format!("`{}` is of a 3D scene, which has no w; take `depth` or `none`", plan.id(*wireframe));
+        return Err(Invalid::new(format!("{path}.color_by"), message));
+    }
+    if given.color_by == Some(EdgeColor::Depth)
+        && let Some(wireframe) = drawn.iter().find(|w| seen(**w).is_none())
+    {
+        let message =
+            format!("`{}` is projected stereographically and has no depth; take `w` or `none`", plan.id(*wireframe));
+        return Err(Invalid::new(format!("{path}.color_by"), message));
+    }
+    let radius = given.radius.map(|radius| positive(&format!("{path}.radius"), radius)).transpose()?;
+    let skin = given.skin.unwrap_or(SKIN);
+    if !(0.0..=1.0).contains(&skin) {
+        let message = format!("expected a number from 0 to 1, found {}", number(skin));
+        return Err(Invalid::new(format!("{path}.skin"), message));
+    }
+    let (color_by, hidden) = (given.color_by.unwrap_or_default(), given.hidden.unwrap_or_default());
+    Ok(Some(EdgesPlan { over, color_by, hidden, radius, skin }))
 }
 
 /// Animations in one figure are played together, from their `.vti`.
@@ -367,7 +529,7 @@ fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[Sh
         let message = "`.raw` files hold colours alone, no ambient occlusion; take `reader: vti`, or `color_by: rgba`";
         return Err(Invalid::new(key, message));
     }
-    for &write in writes {
+    for &write in writes.iter().filter(|shown| shown.render(&resolver.plan).is_some()) {
         if !write.arrays(&resolver.plan).contains(&Aov::AmbientOcclusion) {
             let id = &resolver.plan.stages[write.index()].id;
             return Err(Invalid::new(key, format!("`{id}` has no ambient_occlusion; add it to its `arrays`")));
@@ -380,12 +542,13 @@ fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[Sh
 /// it holds.
 fn add_object(resolver: &mut Resolver, shown: Shown) {
     let plan = &mut resolver.plan;
-    let render = shown.render(plan);
+    let Some(render) = shown.render(plan) else { return };
     let volume = plan[render].dimensions[2] > 1;
     let several = plan[plan[render].scene].objects.len() > 1;
     let given = match shown {
         Shown::Image(write) => plan[write].arrays_given,
         Shown::Animation(animation) => plan[animation].arrays_given,
+        Shown::Wireframe(_) | Shown::Slice(_) => true,
     };
     if !volume || !several || given || shown.arrays(plan).contains(&Aov::Object) {
         return;
@@ -395,6 +558,7 @@ fn add_object(resolver: &mut Resolver, shown: Shown) {
         Shown::Animation(animation) => {
             return plan.get_mut(animation).into_iter().for_each(|animation| animation.arrays.push(Aov::Object));
         }
+        Shown::Wireframe(_) | Shown::Slice(_) => return,
     };
     if let Some(write) = plan.get_mut(write) {
         write.arrays.push(Aov::Object);
@@ -409,32 +573,52 @@ fn add_object(resolver: &mut Resolver, shown: Shown) {
 
 /// The state's text.
 fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
-    let dark = |shown: Shown| plan[shown.render(plan)].is_dark();
+    let dark = |shown: Shown| shown.render(plan).is_some_and(|render| plan[render].is_dark());
+    let images = figure.writes.iter().all(|shown| shown.render(plan).is_some());
     let twins = figure.writes.len() == 2 && plan.is_twin(figure.writes[0].index());
-    let mixed = figure.writes.len() == 2 && figure.writes.iter().filter(|&&write| dark(write)).count() == 1;
+    let mixed = images && figure.writes.len() == 2 && figure.writes.iter().filter(|&&write| dark(write)).count() == 1;
+    let over = figure.edges.and_then(|edges| edges.over);
     let mut panels = Vec::with_capacity(figure.writes.len());
     for &write in &figure.writes {
-        let render = &plan[write.render(plan)];
-        let grid: Grid = match plan[render.scene].dimension {
-            Dimension::Three => camera::<3>(&render.camera)?.grid(render.dimensions),
-            Dimension::Four => camera::<4>(&render.camera)?.grid(render.dimensions),
+        let view = match (write, write.render(plan)) {
+            (Shown::Wireframe(wireframe), _) => plan[wireframe].render(),
+            (_, render) => render,
         };
-        let file = match write {
-            Shown::Image(write) => plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref()),
-            Shown::Animation(animation) => &plan[animation].list,
+        let grid: Option<Grid> = match view.map(|render| &plan[render]) {
+            None => None,
+            Some(render) => Some(match plan[render.scene].dimension {
+                Dimension::Three => camera::<3>(&render.camera)?.grid(render.dimensions),
+                Dimension::Four => camera::<4>(&render.camera)?.grid(render.dimensions),
+            }),
         };
-        let caption = match (figure.writes.len(), render.is_dark()) {
+        let kind = match write {
+            Shown::Image(_) | Shown::Animation(_) => paraview::Kind::Volume,
+            Shown::Wireframe(_) => paraview::Kind::Edges,
+            Shown::Slice(_) => paraview::Kind::Slices,
+        };
+        let files: Vec<&Path> = match write {
+            Shown::Image(write) => vec![plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref())],
+            Shown::Animation(animation) => vec![&plan[animation].list],
+            Shown::Wireframe(wireframe) => vec![&plan[wireframe].file],
+            Shown::Slice(slice) => plan[slice].files.iter().map(PathBuf::as_path).collect(),
+        };
+        let caption = match (figure.writes.len(), dark(write)) {
             (1, _) => String::new(),
             (2, _) if twins => if plan.is_twin(write.index()) { "in 3D" } else { "in 4D" }.to_owned(),
             (2, true) if mixed => "with ambient occlusion".to_owned(),
             (2, false) if mixed => "without ambient occlusion".to_owned(),
             _ => match write {
                 Shown::Image(write) => plan.id(plan[write].render),
-                Shown::Animation(animation) => plan.id(animation),
+                other => &plan.stages[other.index()].id,
             }
             .replace(['-', '_'], " "),
         };
-        panels.push(paraview::Panel { file: beside(&figure.state, file), caption, grid });
+        let files = files.into_iter().map(|file| beside(&figure.state, file)).collect();
+        let fits = |wireframe: &Ref<WireframePlan>| {
+            matches!(write, Shown::Image(_)) && plan[*wireframe].render().is_some_and(|render| Some(render) == view)
+        };
+        let edges = over.filter(fits).map(|wireframe| beside(&figure.state, &plan[wireframe].file));
+        panels.push(paraview::Panel { kind, files, caption, grid, edges });
     }
     let frames = figure.writes.iter().find_map(|shown| shown.frames(plan));
     Ok(paraview::state(&paraview::Figure {
@@ -469,6 +653,20 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             ColorBy::AmbientOcclusion => paraview::ColorBy::AmbientOcclusion,
         },
         colorbar: figure.colorbar,
+        tubes: figure.edges.map(|edges| paraview::Tubes {
+            color_by: match edges.color_by {
+                EdgeColor::Depth => Some("depth"),
+                EdgeColor::W => Some("w"),
+                EdgeColor::None => None,
+            },
+            hidden: match edges.hidden {
+                HiddenEdges::Thin => paraview::Hidden::Thin,
+                HiddenEdges::LeaveOut => paraview::Hidden::LeaveOut,
+                HiddenEdges::Same => paraview::Hidden::Same,
+            },
+            radius: edges.radius,
+            skin: edges.skin,
+        }),
     }))
 }
 

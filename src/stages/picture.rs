@@ -46,6 +46,9 @@ impl RenderPlan {
         if render.screen_space.is_some() {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OCCLUSION;
             (whole, holds) = (size_of::<f32>() as u64, "one layer of its picture and the depth of all of it");
+            if render.lighting.as_ref().is_some_and(|lighting| lighting.bounce) {
+                (whole, holds) = (4 * whole, "one layer of its picture, and of all of it the depth and the light");
+            }
         }
         if render.denoise {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
@@ -86,7 +89,8 @@ impl RenderPlan {
         let aovs = files.aovs().to_vec();
         let (mut seen, mut behind) = (0, 0);
         // Two passes over the voxels: what is seen, and its shade; and, where that takes longest, another in the image.
-        let passes = 2 + u64::from(render.screen_space.is_some());
+        let follows_light = picture.skylight.as_ref().is_some_and(|light| light.in_image == Some(true));
+        let passes = 2 + u64::from(render.screen_space.is_some()) + u64::from(follows_light);
         let running = progress.stage(name, passes * render.voxels());
         let accuracy = picture.render(&aovs, None, progress, |slab| -> Result<(), StageError> {
             seen += slab.seen;

@@ -85,7 +85,7 @@ pub struct RenderSpec {
     /// With 1, surfaces are also lit by what other surfaces reflect of the sky, once (default 0); not of `lights`.
     #[schemars(range(min = 0, max = 1))]
     pub bounce: Option<u64>,
-    /// The share of the lights that surfaces reflect in highlights (default 0).
+    /// The share of the lights that surfaces reflect in highlights (default 0); objects may say their own.
     #[schemars(range(min = 0, max = 1))]
     pub specular: Option<f64>,
     /// The exponent of highlights: the higher, the smaller they are (default 30).
@@ -157,6 +157,7 @@ impl RenderSpec {
             specular: self.specular,
             shininess: self.shininess,
             depth_cue: self.depth_cue.as_ref(),
+            is_glossy: false,
         }
     }
 }
@@ -182,7 +183,7 @@ impl RenderPlan {
 
     /// Why nothing is known of the directions in which the sky is open, if so.
     pub(super) fn no_directions(&self, plan: &Plan) -> Option<String> {
-        no_directions(plan, self.scene, self.occlusion, self.screen_space.is_some())
+        no_directions(plan, self.scene, self.occlusion)
     }
 
     /// The number of voxels.
@@ -270,11 +271,13 @@ impl Stage for RenderPlan {
         let layers = within("layers", spec.layers, 0, 1, MOST_LAYERS)?;
         let halo = if dimension == Dimension::Four { 3 } else { 0 };
         let dilate = within("dilate", spec.dilate, halo, 0, MAX_DILATION)?;
-        let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
+        let keys = LightingKeys { is_glossy: resolver.plan[scene].is_glossy(), ..spec.lighting_keys() };
+        let lighting = lighting::plan(keys, path, dimension, &mut resolver.plan.warnings)?;
         for (key, given) in [("sky", spec.sky.is_some()), ("bounce", lighting.as_ref().is_some_and(|l| l.bounce))] {
             let needed = "needs an occlusion, which tells how much light reaches a surface";
-            let lacks = || (key == "bounce" && occlusion.is_none()).then(|| needed.to_owned());
-            let refusal = no_directions(&resolver.plan, scene, occlusion, screen_space.is_some()).or_else(lacks);
+            let is_dark = occlusion.is_some() || screen_space.is_some();
+            let lacks = || (key == "bounce" && !is_dark).then(|| needed.to_owned());
+            let refusal = no_directions(&resolver.plan, scene, occlusion).or_else(lacks);
             if let Some(message) = refusal.filter(|_| given) {
                 return Err(Invalid::new(format!("{path}.{key}"), message));
             }
@@ -424,17 +427,7 @@ impl Stage for RenderPlan {
 }
 
 /// Why nothing is known of the directions in which the sky is open, if so.
-fn no_directions(
-    plan: &Plan,
-    scene: Ref<ScenePlan>,
-    occlusion: Option<Ref<OcclusionPlan>>,
-    in_screen_space: bool,
-) -> Option<String> {
-    if in_screen_space {
-        let message = "`screen_space` tells how much of the sky is hidden, not where it is open; take the occlusion of an \
-                       `occlusion` stage";
-        return Some(message.to_owned());
-    }
+fn no_directions(plan: &Plan, scene: Ref<ScenePlan>, occlusion: Option<Ref<OcclusionPlan>>) -> Option<String> {
     if let Some(name) = plan[scene].translucent() {
         return Some(format!(
             "{name} lets light through, and where the sky is open is found among opaque objects only; leave out `opacity` \

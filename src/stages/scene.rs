@@ -55,6 +55,11 @@ impl ScenePlan {
         self.translucent().is_some()
     }
 
+    /// Whether some object reflects lights in highlights of its own.
+    pub(super) fn is_glossy(&self) -> bool {
+        self.objects.iter().any(|object| object.specular.is_some_and(|specular| specular > 0.0))
+    }
+
     /// What the first object that light passes is called, if there is one.
     pub(super) fn translucent(&self) -> Option<String> {
         let at = self.objects.iter().position(|object| object.opacity.is_some_and(|opacity| opacity < 1.0))?;
@@ -254,6 +259,7 @@ fn add<const D: usize>(
     let opacity = object.surface_opacity().map_err(|e| blame(plan, scene, i, &e))?;
     builder.add_creased(&name, color, surface, open, crease).map_err(|e| Invalid::new(here.clone(), e.to_string()))?;
     builder.set_opacity(opacity);
+    builder.set_gloss(object.gloss().map_err(|e| blame(plan, scene, i, &e))?);
     Ok(())
 }
 

@@ -43,7 +43,10 @@ impl<const D: usize> SceneRun<D> {
         }
         let gradient = asked.lighting.map_or_else(Vector64::zeros, LightingPlan::gradient);
         let mut light = Skylight::new(gradient);
-        let Some(of) = occlusion else { return Ok(Some(Arc::new(light))) };
+        let Some(of) = occlusion else {
+            light.in_image = Some(asked.bounce);
+            return Ok(Some(Arc::new(light)));
+        };
         if asked.at_voxels && !asked.bounce {
             return Ok(Some(Arc::new(light)));
         }
@@ -113,20 +116,6 @@ mod tests {
                 ),
                 "stages[3].write.arrays[1]: render `r` follows no light from surface to surface; give it `bounce: 1`",
             ),
-            (
-                "  - render: {occlusion: screen_space, dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}}\n"
-                    .to_owned(),
-                "stages[1].render.sky: `screen_space` tells how much of the sky is hidden, not where it is open; take the \
-                 occlusion of an `occlusion` stage",
-            ),
-            (
-                format!(
-                    "{sobol}  - render: {{occlusion: screen_space, dimensions: [1, 1, 1]}}\n  - animate: {{frames: 2, scan: [0, 1], vti: \
-                     a.vti, arrays: [bent_normal]}}\n"
-                ),
-                "stages[3].animate.arrays[0]: `screen_space` tells how much of the sky is hidden, not where it is open; take \
-                 the occlusion of an `occlusion` stage",
-            ),
         ] {
             assert_eq!(told(&stages).unwrap_err(), expected);
         }
@@ -143,6 +132,7 @@ mod tests {
         }
         for stages in [
             "  - render: {dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}}\n  - write: {vti: a.vti, arrays: [bent_normal, light]}\n",
+            "  - render: {occlusion: screen_space, dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}, bounce: 1}\n  - write: {vti: a.vti, arrays: [bent_normal, bounce]}\n",
             "  - occlusion: {}\n  - render: {dimensions: [1, 1, 1], bounce: 0}\n  - write: {vti: a.vti, arrays: [irradiance]}\n",
         ] {
             assert_eq!(told(stages), Ok(()));

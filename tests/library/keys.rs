@@ -35,7 +35,7 @@ stages:
   - animate: {id: an, input: r, frames: 3, moves: scene, turn: {plane: xw, from: 0, to: 90, center: [0, 0, 0, -1]}, move: {from: [0, 0, 0, 0], to: [0, 0, 0, 1]}, scan: [0, 0.1], rate: 24, vti: an.vti, arrays: [rgba, opacity], encoding: appended, compression: none}
   - render: {id: space, occlusion: screen_space, screen_space: {slices: 8, steps: 8, thickness: 1, max_distance: 2}, dimensions: [3, 4, 5], input: s}
   - write: {id: w4, input: space, vti: d.vti}
-  - shade: {id: sh, image: v.vti, depth: depth, normal: normal, dimension: 4, camera: {field_of_view: 80}, screen_space: {slices: 4}, vti: s.vti}
+  - shade: {id: sh, image: v.vti, depth: depth, normal: normal, dimension: 4, camera: {field_of_view: 80}, screen_space: {slices: 4}, arrays: [irradiance], sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, albedo: rgba, vti: s.vti}
   - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
 ";
 
@@ -154,6 +154,10 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("ShadeSpec.depth", Ok("sh.depth=z")),
     ("ShadeSpec.normal", Ok("sh.normal=n")),
     ("ShadeSpec.screen_space", Ok("sh.screen_space.slices=5")),
+    ("ShadeSpec.arrays", Ok("sh.arrays=[bounce]")),
+    ("ShadeSpec.sky", Ok("sh.sky.gradient=[0, 0.4, 0, 0]")),
+    ("ShadeSpec.bounce", Ok("sh.bounce=0")),
+    ("ShadeSpec.albedo", Ok("sh.albedo=rgb")),
     ("ShadeSpec.vti", Err("a file doesn't depend on its name")),
     ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
@@ -252,6 +256,8 @@ fn every_object_s_field_counts() {
     for set in [
         "s.objects[0].name=two",
         "s.objects[0].color=[1, 0, 0.5]",
+        "s.objects[0].specular=0.5",
+        "s.objects[0].shininess=8",
         "s.objects[0].orientation=input",
         "s.objects[0].transform=[{translate: [0, 0, 0, -1.1]}]",
         "s.objects[0].tesseract.size=0.51",

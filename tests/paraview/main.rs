@@ -7,4 +7,5 @@ mod images_by_others;
 mod paraview_run;
 mod paraview_state;
 mod pipelines;
+mod plugin;
 mod vtk_files;

@@ -23,7 +23,7 @@ mod cells;
 mod complex;
 mod kernel;
 mod polygon;
-mod section;
+pub mod section;
 mod slivers;
 
 use std::collections::{BTreeMap, HashMap};

@@ -1,6 +1,8 @@
 //! The open files of one picture: each slab goes to all of them.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use super::{Content, Format, Opening, VoxelFile, WritePlan};
 use crate::io::Error;
@@ -75,6 +77,13 @@ impl PictureFiles {
         Ok(Self { aovs, files: open.into_iter().collect() })
     }
 
+    /// Opens no file: the arrays of a picture are kept in memory.
+    pub fn memory(aovs: &[Aov], layers: usize, kept: Rc<RefCell<Vec<Array>>>) -> Self {
+        let places = (0..aovs.iter().map(|aov| aov.count(layers)).sum()).collect();
+        let file: Box<dyn VoxelFile> = Box::new(Kept(kept));
+        Self { aovs: aovs.to_vec(), files: vec![Open { path: PathBuf::new(), file, places }] }
+    }
+
     /// What the files need of each slab, in this order.
     pub fn aovs(&self) -> &[Aov] {
         &self.aovs
@@ -97,5 +106,24 @@ impl PictureFiles {
     /// Completes the files and gives them their names; returns each with its length.
     pub fn finish(self) -> Result<Vec<(PathBuf, u64)>, Error> {
         self.files.into_iter().map(|Open { path, file, .. }| Ok((path, file.finish()?))).collect()
+    }
+}
+
+/// Arrays in memory that grow slab by slab.
+struct Kept(Rc<RefCell<Vec<Array>>>);
+
+impl VoxelFile for Kept {
+    fn add_slab(&mut self, _: usize, slab: &[&Array]) -> Result<(), Error> {
+        let mut kept = self.0.borrow_mut();
+        if kept.is_empty() {
+            kept.extend(slab.iter().map(|&array| array.clone()));
+        } else {
+            kept.iter_mut().zip(slab).for_each(|(all, more)| all.values.append(&more.values));
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<u64, Error> {
+        Ok(0)
     }
 }

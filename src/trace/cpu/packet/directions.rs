@@ -136,6 +136,13 @@ impl<const D: usize> Rays<D> {
         }
     }
 
+    /// Tells the first `count` rays, in the sequence's order, to `watch`: where each goes, and whether it is in the set.
+    pub fn tell(&self, set: u64, count: usize, watch: &mut dyn FnMut(Vector<D>, bool)) {
+        for i in 0..count {
+            watch(Vector::from_fn(|k, _| self.direction[k][i]), set >> i & 1 == 1);
+        }
+    }
+
     /// Completes the directions by what box tests need.
     #[inline(always)]
     pub fn complete(&mut self) {

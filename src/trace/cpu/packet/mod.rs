@@ -28,4 +28,4 @@ mod traverse;
 mod x86;
 
 pub use level::Level;
-pub use tracer::PacketTracer;
+pub use tracer::{PacketTracer, Watch};

@@ -14,7 +14,7 @@ use crate::accel::Tracer;
 use crate::geometry::{Dimension, Frame, Ray, Vector};
 use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
-use crate::trace::cpu::scalar::estimate_at;
+use crate::trace::cpu::scalar::{estimate_at, watched_at};
 use crate::trace::estimate::{Accumulator, Estimate};
 use crate::trace::sampling::LOWEST_SQUARED_COSINE;
 use crate::trace::{Sampler, Sampling, Sequence, ShadingPoint, Target};
@@ -35,6 +35,9 @@ pub struct PacketTracer<const D: usize> {
     traversal: Traversal<D>,
 }
 
+/// Is told of each ray where it goes, and whether it escapes.
+pub type Watch<'w, const D: usize> = dyn FnMut(Vector<D>, bool) + 'w;
+
 /// Rays to be traced from one point.
 enum Source<'a, const D: usize> {
     Sequence { sequence: Sequence, frame: Frame<D>, samples: u32, target: Option<Target> },
@@ -51,10 +54,11 @@ struct AtVertex<'a, const D: usize> {
 }
 
 /// All that is asked at once.
-struct Job<'a, const D: usize> {
+struct Job<'a, 'w, const D: usize> {
     query: Query<'a, D>,
     vertex: Option<AtVertex<'a, D>>,
     source: Source<'a, D>,
+    watch: Option<&'a mut Watch<'w, D>>,
     progress: &'a dyn Progress,
 }
 
@@ -85,6 +89,36 @@ impl<const D: usize> PacketTracer<D> {
         sampling: &Sampling,
         progress: &dyn Progress,
     ) -> Result<Estimate, Cancelled> {
+        if tracer.mesh().is_translucent() {
+            return estimate_at(tracer, point, sampling, progress);
+        }
+        self.at(tracer, point, sampling, None, progress)
+    }
+
+    /// The same, and tells each ray to `watch`: block by block of 64, the rays of a block in an order that keeps aligned
+    /// runs of 2^k of them together. Objects that let light through count as opaque.
+    ///
+    /// # Errors
+    /// [`Cancelled`] if `progress` says so.
+    pub fn watched(
+        &mut self,
+        tracer: &Tracer<D>,
+        point: &ShadingPoint<D>,
+        sampling: &Sampling,
+        watch: &mut Watch<D>,
+        progress: &dyn Progress,
+    ) -> Result<Estimate, Cancelled> {
+        self.at(tracer, point, sampling, Some(watch), progress)
+    }
+
+    fn at(
+        &mut self,
+        tracer: &Tracer<D>,
+        point: &ShadingPoint<D>,
+        sampling: &Sampling,
+        watch: Option<&mut Watch<D>>,
+        progress: &dyn Progress,
+    ) -> Result<Estimate, Cancelled> {
         let mesh = tracer.mesh();
         let (position, normal) = (point.position(mesh), point.normal(mesh));
         if normal.amax() == 0.0 {
@@ -94,9 +128,8 @@ impl<const D: usize> PacketTracer<D> {
             ShadingPoint::Vertex(vertex) => tracer.incidence().around(mesh.identity[vertex as usize]),
             ShadingPoint::Inside { .. } => &[],
         };
-        let is_served = !mesh.is_translucent() && tracer.wide().serves(&position) && tracer.wide().holds(around, mesh);
-        if !is_served {
-            return estimate_at(tracer, point, sampling, progress);
+        if !(tracer.wide().serves(&position) && tracer.wide().holds(around, mesh)) {
+            return watched_at(tracer, point, sampling, watch, progress);
         }
         let vertex = match *point {
             ShadingPoint::Vertex(vertex) => {
@@ -113,7 +146,7 @@ impl<const D: usize> PacketTracer<D> {
             samples: sampling.samples,
             target: sampling.target,
         };
-        Ok(self.traced(Job { query, vertex, source, progress })?.estimate())
+        Ok(self.traced(Job { query, vertex, source, watch, progress })?.estimate())
     }
 
     /// How many of the rays from a point in these directions, none longer than 1, hit a simplex other than `ignored`
@@ -138,7 +171,7 @@ impl<const D: usize> PacketTracer<D> {
         let query = Query::new(tracer, *origin, (normal, 0.0), limit, [ignored.as_slice(), &[]]);
         let source = Source::Directions(directions);
         // Nobody cancels.
-        let found = self.traced(Job { query, vertex: None, source, progress: &Silent });
+        let found = self.traced(Job { query, vertex: None, source, watch: None, progress: &Silent });
         found.map_or(0, |found| found.rays() - found.escaped())
     }
 
@@ -189,7 +222,7 @@ with_avx512!(compiled_for_avx512);
 /// Counts the rays that escape.
 #[inline(always)]
 fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
-    let Job { query, vertex, mut source, progress } = job;
+    let Job { query, vertex, mut source, mut watch, progress } = job;
     let query = &query;
     let around = match &vertex {
         Some(at) => {
@@ -222,6 +255,9 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
         let mut open = alive & !(hidden | hit);
         if !query.wide.far.nodes.is_empty() {
             open &= !query.hits_far(&packets.rays, open);
+        }
+        if let Some(watch) = &mut watch {
+            packets.rays.tell(open, count, watch);
         }
         accumulator.add(open, count as u32);
         if let Source::Sequence { target: Some(target), .. } = &source

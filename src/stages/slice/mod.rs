@@ -4,6 +4,12 @@
 //! one of a 3D scene is its outline in a plane. Not the picture is cut but the mesh, exactly ([`crate::mesh::section`]).
 //! One slice is one `.vtp`; a sequence of them is so many, and a `.pvd` that ParaView plays, with the place of each as its
 //! time.
+//!
+//! A peel of a hypersphere is cut out by a torus of Hopf instead ([`crate::mesh::peel`]), and shown by the stereographic
+//! projection ([`crate::mesh::stereographic`]), as slices of what lies around a centre may be too.
+
+mod file;
+mod level;
 
 use std::path::{Path, PathBuf};
 
@@ -11,24 +17,20 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use self::file::Shown;
+pub use self::level::{LevelPlan, PeelWord};
 use super::describe::Counts;
 use super::names::file_names;
 use super::occlusion::{self, OcclusionPlan};
-use super::range::check_length;
+use super::projection::{ProjectionWord, StereographicPlan};
 use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
 use super::write::vtu;
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
-use crate::geometry::{Dimension, Vector64, narrow};
-use crate::io::{self, AtomicFile, PIPELINE, pvd, vtp};
-use crate::mesh::Mesh;
-use crate::mesh::section::{Hyperplane, Section, section};
-use crate::occlusion::Estimates;
+use crate::geometry::Dimension;
+use crate::io::{self, AtomicFile, pvd};
+use crate::mesh::section::section;
 use crate::text::number;
-use crate::volume::Array;
-
-/// The most slices of a sequence.
-const MOST: u64 = 10_000;
 
 /// Cross-sections of a scene's bodies by hyperplanes.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
@@ -42,7 +44,18 @@ pub struct SliceSpec {
     pub occlusion: Option<String>,
     /// The hyperplane's normal n, of any length but zero (default: along the last axis).
     pub normal: Option<Vec<f64>>,
-    /// Where it is: the number c in n.x = c (default 0).
+    /// Instead of `normal`: `w` cuts along the fourth axis, `hopf` along the tori of Hopf.
+    pub peel: Option<PeelWord>,
+    /// With `peel: hopf`: the axis of Hopf's sphere that angles are measured from (default `[0, 0, 1]`).
+    pub axis: Option<[f64; 3]>,
+    /// The centre of the hypersphere that is peeled or projected (default: the origin).
+    pub center: Option<Vec<f64>>,
+    /// Where its points are put: `plane`, the hyperplane's own coordinates (default), or `stereographic` (default of
+    /// Hopf's tori).
+    pub projection: Option<ProjectionWord>,
+    /// From where it is projected: the pole's direction from the centre (default: along the last axis).
+    pub pole: Option<Vec<f64>>,
+    /// Where it is: the number c in n.x = c (default 0), or the angle of a torus in degrees, above 0 and below 90 (default 45).
     pub at: Option<f64>,
     /// Instead of `at`, for a sequence: the first c and the last.
     pub range: Option<[f64; 2]>,
@@ -60,9 +73,11 @@ pub struct SlicePlan {
     pub scene: Ref<ScenePlan>,
     /// The occlusion that is shown on them.
     pub occlusion: Option<Ref<OcclusionPlan>>,
-    /// The hyperplanes' normal; not zero.
-    pub normal: Vec<f64>,
-    /// Where they are: the number c in n.x = c of each.
+    /// What cuts.
+    pub level: LevelPlan,
+    /// The projection of their points, if it is not to the hyperplane.
+    pub stereographic: Option<StereographicPlan>,
+    /// Where they are: the number c in n.x = c of each, or the angle.
     pub places: Vec<f64>,
     /// The file of each, below `out`.
     pub files: Vec<PathBuf>,
@@ -87,19 +102,21 @@ impl Stage for SlicePlan {
 
     fn resolve(spec: &SliceSpec, path: &str, resolver: &mut Resolver) -> Result<Self, Invalid> {
         let (scene, occlusion) = scene_and_occlusion(resolver, path, spec.input.as_deref(), spec.occlusion.as_deref())?;
-        let normal = normal(spec.normal.as_deref(), &format!("{path}.normal"), resolver.plan[scene].dimension)?;
-        let places = places(spec, path)?;
+        let dimension = resolver.plan[scene].dimension;
+        let level = LevelPlan::new(spec, path, dimension)?;
+        let stereographic = stereographic(spec, path, &level, dimension)?;
+        let places = level::places(spec, path)?;
         let key = format!("{path}.vtp");
         let whole = resolver.outputs.claim(&key, &spec.vtp, Some("vtp"))?;
         if places.len() == 1 {
-            return Ok(Self { scene, occlusion, normal, places, files: vec![whole], list: None });
+            return Ok(Self { scene, occlusion, level, stereographic, places, files: vec![whole], list: None });
         }
         let stem = whole.with_extension("").to_string_lossy().into_owned();
         let mut claim = |name: String| resolver.outputs.claim(&key, &name, None);
         let digits = (places.len() - 1).to_string().len();
         let files: Result<_, _> = (0..places.len()).map(|i| claim(format!("{stem}-{i:0digits$}.vtp"))).collect();
         let list = claim(format!("{stem}.pvd"))?;
-        Ok(Self { scene, occlusion, normal, places, files: files?, list: Some(list) })
+        Ok(Self { scene, occlusion, level, stereographic, places, files: files?, list: Some(list) })
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -137,29 +154,38 @@ impl Stage for SlicePlan {
     }
 
     fn written(me: Ref<Self>, plan: &Plan) -> Value {
-        let Self { normal, places, .. } = &plan[me];
-        match places.as_slice() {
-            [at] => json!({ "normal": normal, "at": at }),
-            _ => json!({ "normal": normal }),
+        let Self { level, stereographic, places, .. } = &plan[me];
+        let mut written = match level {
+            LevelPlan::W => json!({}),
+            LevelPlan::Across(normal) => json!({ "normal": normal }),
+            LevelPlan::Hopf { center, axis } => json!({ "center": center, "axis": axis }),
+        };
+        if let Some(StereographicPlan { center, pole }) = stereographic {
+            written["projection"] = json!(ProjectionWord::Stereographic);
+            (written["center"], written["pole"]) = (json!(center), json!(pole));
         }
+        if let [at] = places.as_slice() {
+            written["at"] = json!(at);
+        }
+        written
     }
 
     fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
-        let Self { scene, occlusion, normal, places, files, list } = &plan[me];
+        let Self { scene, occlusion, level, stereographic, places, files, list } = &plan[me];
         let with = occlusion.map_or("without occlusion".into(), |occlusion| format!("with {}", plan.id(occlusion)));
-        let normal: Vec<String> = normal.iter().map(|x| number(*x)).collect();
         let (first, last) = (number(places[0]), number(places[places.len() - 1]));
         let places = match places.len() {
             1 => format!("at {first}"),
             n => format!("{n} from {first} to {last}"),
         };
+        let shown = if stereographic.is_some() { ", projected stereographically" } else { "" };
         let file = list.as_ref().unwrap_or(&files[0]);
-        format!("{} {with}, across [{}], {places} -> {}", plan.id(*scene), normal.join(", "), file.display())
+        format!("{} {with}, {}, {places}{shown} -> {}", plan.id(*scene), level.line(), file.display())
     }
 
     fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
         let plan = run.plan;
-        let Self { occlusion, normal, places, files, list, .. } = &plan[me];
+        let Self { occlusion, level: cut, stereographic, places, files, list, .. } = &plan[me];
         let stale: Vec<usize> = (0..files.len()).filter(|&i| run.is_stale(&files[i])).collect();
         if let Some(occlusion) = occlusion.filter(|_| !stale.is_empty()) {
             occlusion::values(occlusion, run, scene)?;
@@ -169,16 +195,33 @@ impl Stage for SlicePlan {
         let mut faces = 0;
         for &i in &stale {
             let file = &files[i];
-            let normal = Vector64::<D>::from_fn(|r, _| normal[r]);
-            // The checks before leave no normal that has no hyperplane.
-            let Some(plane) = Hyperplane::new(normal, places[i]) else { continue };
-            let found = section(mesh, &plane, values.map(|values| &*values.values));
+            let shown = match stereographic {
+                Some(projection) => projection.map().map(Shown::Stereographic),
+                None => cut.plane(places[i]).map(Shown::Plane),
+            };
+            // The checks before leave nothing that lacks one of them.
+            let (Some(level), Some(shown)) = (cut.level::<D>(places[i]), shown) else { continue };
+            let mut found = section(mesh, &*level, values.map(|values| &*values.values));
+            shown.turn(&*level, mesh, &mut found);
+            let points = match (shown.points(mesh, &found), stereographic) {
+                (Ok(points), _) => points,
+                (Err((why, object)), Some(projection)) => {
+                    return Err(projection.complain(me, plan, why, &mesh.objects[object as usize].name));
+                }
+                (Err(_), None) => continue,
+            };
             faces += found.faces.len();
             let mut notes = Vec::new();
             if found.faces.is_empty() && list.is_none() {
-                notes.push(format!("{}: the hyperplane meets nothing; the file is empty", plan.id(me)));
+                let what = match cut {
+                    LevelPlan::Across(_) | LevelPlan::W => "the hyperplane meets nothing; the file is empty",
+                    LevelPlan::Hopf { .. } => {
+                        "the torus meets nothing; the file is empty. Is `center` within the body?"
+                    }
+                };
+                notes.push(format!("{}: {what}", plan.id(me)));
             }
-            let bytes = write(&plan.out.join(file), run.told, mesh, &plane, &found, values)?;
+            let bytes = file::write(&plan.out.join(file), run.told, mesh, &points, &found, values)?;
             run.made(file, bytes, notes)?;
         }
         if let Some(list) = list.as_ref().filter(|list| run.is_stale(list)) {
@@ -198,89 +241,29 @@ impl Stage for SlicePlan {
     }
 }
 
-/// The normal, checked.
-fn normal(given: Option<&[f64]>, path: &str, dimension: Dimension) -> Result<Vec<f64>, Invalid> {
-    let count = dimension.get();
-    let Some(normal) = given else { return Ok((0..count).map(|axis| f64::from(axis == count - 1)).collect()) };
-    if normal.len() != count {
-        let message = format!("expected {count} numbers (the scene is {count}D), found {}", normal.len());
-        return Err(Invalid::new(path, message));
-    }
-    for (i, &x) in normal.iter().enumerate() {
-        check_length(&format!("{path}[{i}]"), x)?;
-    }
-    if normal.iter().all(|x| x.abs() < super::MIN_LENGTH) {
-        let axis: Vec<&str> = (0..count).map(|axis| if axis == count - 1 { "1" } else { "0" }).collect();
-        let message = format!("the normal is zero, and no hyperplane has that; try `normal: [{}]`", axis.join(", "));
-        return Err(Invalid::new(path, message));
-    }
-    Ok(normal.to_vec())
-}
-
-/// Where the hyperplanes are.
-fn places(spec: &SliceSpec, path: &str) -> Result<Vec<f64>, Invalid> {
-    match (spec.at, spec.range, spec.count) {
-        (at, None, None) => Ok(vec![check_length(&format!("{path}.at"), at.unwrap_or(0.0))?]),
-        (None, Some([first, last]), Some(count)) => {
-            check_length(&format!("{path}.range[0]"), first)?;
-            check_length(&format!("{path}.range[1]"), last)?;
-            if !(2..=MOST).contains(&count) {
-                let message = format!("expected 2 to {MOST} slices, found {count}; for one, say `at` instead");
-                return Err(Invalid::new(format!("{path}.count"), message));
+/// The projection, if its points aren't to stay in their hyperplane.
+fn stereographic(
+    spec: &SliceSpec,
+    path: &str,
+    level: &LevelPlan,
+    dimension: Dimension,
+) -> Result<Option<StereographicPlan>, Invalid> {
+    let refuse = |key: &str, message: &str| Err(Invalid::new(format!("{path}.{key}"), message));
+    match spec.projection {
+        Some(ProjectionWord::Camera) => {
+            refuse("projection", "slices are shown in their own `plane`, or `stereographic`; a camera sees wireframes")
+        }
+        Some(ProjectionWord::Plane) if !level.is_flat() => {
+            refuse("projection", "a torus of Hopf lies in no hyperplane; take `stereographic`")
+        }
+        Some(ProjectionWord::Plane) | None if level.is_flat() => {
+            for (key, given) in [("pole", &spec.pole), ("center", &spec.center)] {
+                if given.is_some() {
+                    return refuse(key, "is for `projection: stereographic`; add that, or take it out");
+                }
             }
-            if first == last {
-                let message = format!("the range begins and ends at {}; for one slice, say `at`", number(first));
-                return Err(Invalid::new(format!("{path}.range"), message));
-            }
-            let steps = (count - 1) as f64;
-            let at = |i: u64| if i == count - 1 { last } else { first + (last - first) * i as f64 / steps };
-            Ok((0..count).map(at).collect())
+            Ok(None)
         }
-        (Some(_), _, _) => {
-            let message = "`at` is for one slice, `range` and `count` for several; take one of them out";
-            Err(Invalid::new(format!("{path}.at"), message))
-        }
-        (None, Some(_), None) => {
-            Err(Invalid::new(format!("{path}.range"), "a range needs the number of its slices: add `count`"))
-        }
-        (None, None, Some(_)) => {
-            Err(Invalid::new(format!("{path}.count"), "so many slices need a `range: [FIRST, LAST]`"))
-        }
+        _ => Ok(Some(StereographicPlan::new(spec.center.as_deref(), spec.pole.as_deref(), path, dimension)?)),
     }
-}
-
-/// Writes a slice; returns the file's length.
-fn write<const D: usize>(
-    path: &Path,
-    told: &str,
-    mesh: &Mesh<D>,
-    plane: &Hyperplane<D>,
-    section: &Section,
-    found: Option<&Estimates>,
-) -> Result<u64, io::Error> {
-    let places: Vec<Vector64<D>> = section.points.iter().map(|point| point.position(mesh)).collect();
-    let points: Vec<[f32; 3]> = places.iter().map(|p| plane.coordinates(p).map(|x| x as f32)).collect();
-    let position: Vec<f32> = places.iter().flat_map(|p| narrow(p).iter().copied().collect::<Vec<_>>()).collect();
-    let object: Vec<u16> = section.points.iter().map(|point| point.object as u16 + 1).collect();
-    let mut arrays = vec![Array::new("position", D, position), Array::new("object", 1, object)];
-    if let Some(found) = found {
-        let values: Vec<f32> = section.points.iter().map(|point| point.value(&found.values)).collect();
-        arrays.push(Array::new("ambient_occlusion", 1, values));
-        // Of loaded values nothing is known.
-        if found.errors.len() == found.values.len() {
-            let errors: Vec<f32> = section.points.iter().map(|point| point.error(&found.errors)).collect();
-            arrays.push(Array::new("occlusion_error", 1, errors));
-        }
-    }
-    let mut file = AtomicFile::create(path)?;
-    let texts = [(PIPELINE, told)];
-    match Dimension::of::<D>() {
-        Dimension::Three => {
-            let lines: Vec<[u32; 2]> = section.faces.iter().map(|&[a, b, _]| [a, b]).collect();
-            vtp::write(&mut file, &points, vtp::Cells::Lines(&lines), &arrays, &[], &texts)
-        }
-        Dimension::Four => vtp::write(&mut file, &points, vtp::Cells::Triangles(&section.faces), &arrays, &[], &texts),
-    }
-    .map_err(AtomicFile::name_in(path))?;
-    file.commit()
 }
