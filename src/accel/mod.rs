@@ -8,6 +8,7 @@ mod lines;
 mod node;
 mod overlap;
 mod passages;
+mod rows;
 mod tracer;
 mod wide;
 
@@ -15,5 +16,6 @@ pub use bvh::Bvh;
 pub use lines::Row;
 pub use node::Node;
 pub use passages::{Candidate, Passage, Wanted};
+pub use rows::{BOTTOM, LEAF, Leaf, NODE, Reference, WIDTH, WideNode, place};
 pub use tracer::{Hit, Tracer};
-pub use wide::{BOTTOM, LEAF, Leaf, NODE, Reference, Scale, WIDTH, WideBvh, WideNode, place};
+pub use wide::{Scale, WideBvh};

@@ -1,9 +1,8 @@
 //! The rays of one shading point, 64 at a time.
 //!
 //! These are the directions of [`Sequence::next_direction`], bit for bit: the same operations in the same order, without
-//! branches, so that the compiler works on several directions at once. Their order within a block differs, which a count
-//! does not notice. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
-//! taken in ascending order, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
+//! branches, so that the compiler works on several directions at once. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
+//! taken in ascending order, which a count does not notice, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
 
 use super::lanes::Lanes;
 use crate::accel::WIDTH;
