@@ -82,7 +82,9 @@ def setp(proxy, **properties):
 
 
 def read_vti(panel):
-    reader = XMLImageDataReader(registrationName=panel['file'], FileName=[locate_file(panel['file'])])
+    # A list of parts, or an image.
+    kind = XMLPartitionedImageDataReader if panel['file'].endswith('.pvti') else XMLImageDataReader
+    reader = kind(registrationName=panel['file'], FileName=[locate_file(panel['file'])])
     setp(reader, TimeArray='None')
     return reader
 
@@ -395,7 +397,7 @@ def show_image(panel, reader, array, v, aspect):
 # -------------------------------------------------------------------------------------------------- edges and slices
 
 # The radius of tubes as a share of the diagonal of what is shown, and of hidden ones as a share of that.
-TUBE, THIN = 0.003, 0.4
+TUBE, THIN = 0.0022, 0.45
 PALE, INK = (0.78, 0.78, 0.78), (0.2, 0.2, 0.2)
 # What is near is dark; below and above the middle of w there are two hues. Both are told apart in grey too.
 RAMPS = {'depth': ((0.0, 0.04, 0.09, 0.27), (0.5, 0.16, 0.42, 0.66), (1.0, 0.68, 0.83, 0.93)),
@@ -501,26 +503,26 @@ def show_tubes(name, box, v):
 
 
 def finish_tubes(shown):
-    """The ranges of colours, and a bar beside the first panel of each; `shown` has an array and a view for each panel."""
+    """The ranges of colours, and a bar in the last panel of each; `shown` has an array and a view for each panel."""
     for array, (low, high) in RANGES.items():
         if not high > low:
             low, high = low - 0.5, high + 0.5
         points = [v for x, r, g, b in RAMPS[array] for v in (low + x * (high - low), r, g, b)]
         setp(GetColorTransferFunction(array), AutomaticRescaleRangeMode='Never', ColorSpace='RGB', RGBPoints=points,
              ScalarRangeInitialized=1.0)
-        v = [view for name, view in shown if name == array][0]
+        v = [view for name, view in shown if name == array][-1]
         bar, size = GetScalarBar(GetColorTransferFunction(array), v), text_size()
         setp(bar, Title=array, ComponentTitle='', TitleColor=TEXT, LabelColor=TEXT, TitleFontFamily='Arial',
-             LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0,
+             LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0, HorizontalTitle=1,
              LabelFormat='%.2f', RangeLabelFormat='%.2f', UseCustomLabels=1, CustomLabels=[(low + high) / 2],
-             ScalarBarThickness=int(0.6 * size), ScalarBarLength=0.3, Orientation='Vertical')
+             ScalarBarThickness=int(0.6 * size), ScalarBarLength=0.25, Orientation='Vertical')
         for place in ('Any Location', 'AnyLocation'):
             try:
                 bar.WindowLocation = place
                 break
             except ValueError:
                 pass
-        setp(bar, Position=[0.885, 0.06], Visibility=1)
+        setp(bar, Position=[0.8, 0.06], Visibility=1)
 
 
 def show_edges(panel, box, v, aspect):
@@ -539,7 +541,7 @@ def show_edges(panel, box, v, aspect):
 
 
 def show_slices_alone(panel, v, aspect):
-    """Surfaces that lie in one space, cut open as the volumes are; several have a colour each."""
+    """Surfaces that lie in one space. Several have a colour each, and are cut open as CUT says, to show what is within."""
     readers = [read_polydata(name) for name in panel['files']]
     filled = [(k, reader) for k, reader in enumerate(readers) if is_filled(reader)]
     light_view(v)
@@ -552,7 +554,7 @@ def show_slices_alone(panel, v, aspect):
         skin = ProgrammableFilter(registrationName=name + ': skin', Input=reader)
         skin.Script = 'NUMBER, TINTS = %r, %r\n' % (k if len(readers) > 1 else None, TINTS) + SLICE_SKIN
         shown = skin
-        if CUT is not None:
+        if CUT is not None and len(readers) > 1:
             shown = Clip(registrationName=name + ': cut', Input=skin)
             centre = middle_of(box)
             if CUT[0] == 'plane':

@@ -8,7 +8,9 @@ mod compare;
 mod console;
 mod devices;
 mod info;
+mod merge;
 mod options;
+mod piece;
 mod run;
 mod schema;
 mod study;
@@ -39,6 +41,8 @@ struct Cli {
 enum Verb {
     /// Run a pipeline and write its files
     Run(run::Run),
+    /// Make a pipeline's files of the pieces of its run
+    Merge(merge::Merge),
     /// Do everything short of running: print the plan, write nothing
     Check(check::Check),
     /// Measure error against time of the occlusion methods on a pipeline's scene
@@ -88,6 +92,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
             RunError::Refused(error) => Failure::Refused(Box::new(error)),
+            RunError::Pieces(error) => Failure::Refused(Box::new(error)),
             RunError::Cancelled(_) => Failure::Cancelled,
             error => Failure::Failed(Box::new(error)),
         }
@@ -131,6 +136,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let console = Console::new(cli.messages);
     let result = match cli.verb {
         Verb::Run(run) => run.execute(&console),
+        Verb::Merge(merge) => merge.execute(&console),
         Verb::Check(check) => check.execute(&console),
         Verb::Study(study) => study.execute(&console),
         Verb::Compare(compare) => compare.execute(&console),

@@ -9,6 +9,7 @@ use clap::Args;
 
 use super::console::Console;
 use super::options::PipelineOptions;
+use super::piece::PieceOptions;
 use super::watch::Watch;
 use super::{Failure, Outcome};
 
@@ -17,6 +18,8 @@ use super::{Failure, Outcome};
 pub struct Run {
     #[command(flatten)]
     options: PipelineOptions,
+    #[command(flatten)]
+    piece: PieceOptions,
     /// Print the summary as JSON
     #[arg(long)]
     json: bool,
@@ -24,7 +27,11 @@ pub struct Run {
 
 impl Run {
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
-        let (pipelines, settings) = self.options.load_all(console)?;
+        let piece = self.piece.piece(console)?;
+        let (mut pipelines, settings) = self.options.load_all(console)?;
+        if let Some(piece) = piece {
+            pipelines.iter_mut().for_each(|pipeline| *pipeline = pipeline.in_piece(piece));
+        }
         let watch = Watch::new(console)?;
         if pipelines.len() > 1 {
             let checked = settings.pool().map_err(RunError::Threads)?.install(|| check_together(&pipelines, &watch));

@@ -15,8 +15,10 @@ mod cache;
 mod document;
 mod error;
 mod guard;
+mod launcher;
 mod lock;
 pub mod overrides;
+mod pieces;
 mod pool;
 mod provenance;
 mod report;
@@ -32,13 +34,15 @@ use std::path::{Path, PathBuf};
 use crate::progress::{Progress, Silent};
 use crate::stages::prepare::Prepared;
 use crate::stages::write::PROGRAM;
-use crate::stages::{Invalid, Plan, suggest};
+use crate::stages::{Invalid, Piece, Plan, suggest};
 
 pub use document::Document;
 pub use error::{Error, Place, Refusal};
+pub use launcher::Launched;
+pub use pieces::PiecesError;
 pub use provenance::Told;
 pub use report::{FileReport, Report, StageTime};
-pub use run::{RunError, run};
+pub use run::{RunError, merge, run};
 pub use schema::schema;
 pub use settings::{Backend, BackendError, Settings};
 pub use study::{Study, study};
@@ -95,6 +99,11 @@ impl Pipeline {
         guard::check(self)?;
         provenance::check(self)?;
         self.plan.prepare(wanted, progress).map_err(|invalid| self.document.refuse(invalid))
+    }
+
+    /// The same pipeline for a piece of its run, which works in a folder of its own.
+    pub fn in_piece(&self, piece: Piece) -> Self {
+        Self { plan: self.plan.in_piece(piece), ..self.clone() }
     }
 
     /// What is allowed but probably not meant, each with its place.

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use super::book::Book;
 use super::cache::MadeBy;
 use super::lock::{Busy, Lock};
+use super::pieces::{self, PiecesError};
 use super::report::Report;
 use super::settings::Backend;
 use super::{Error, Pipeline, Settings, provenance};
@@ -23,9 +24,10 @@ use crate::progress::Progress;
 use crate::session::Session;
 use crate::stages::describe::grouped;
 use crate::stages::occlusion::OcclusionPlan;
+use crate::stages::piece::Joined;
 use crate::stages::prepare::{Loaded, Prepared};
 use crate::stages::scene::{AnyMesh, ScenePlan};
-use crate::stages::{Keys, Ledger, Needs, Ref, Run, SceneRun, StageError};
+use crate::stages::{Keys, Ledger, Needs, Ref, Run, SceneRun, StageError, Work};
 use crate::trace::opencl::OpenCl;
 use crate::volume::available_memory;
 
@@ -58,6 +60,9 @@ pub enum RunError {
     /// Another run writes into the same folder.
     #[error(transparent)]
     Busy(#[from] Busy),
+    /// The pieces of a run can't be joined; nothing was written.
+    #[error(transparent)]
+    Pieces(#[from] PiecesError),
     /// An input was replaced or written to while it was read.
     #[error("{}: the file changed while it was read; nothing was written, so run again", .0.display())]
     InputChanged(PathBuf),
@@ -80,10 +85,30 @@ impl<E: Into<StageError>> From<E> for RunError {
 /// # Errors
 /// [`RunError`]; files that were finished before stay, none is left half-written.
 pub fn run(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
-    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress))
+    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress, None))
 }
 
-fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
+/// Makes a pipeline's files of the parts that the pieces of a run left: the same bytes as [`run`] makes. `count` says of how
+/// many pieces, where folders of several such runs are there.
+///
+/// # Errors
+/// [`RunError::Pieces`] if a piece is missing, or of something else; else as [`run`].
+pub fn merge(
+    pipeline: &Pipeline,
+    count: Option<usize>,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Report, RunError> {
+    let joined = pieces::find(pipeline, count)?;
+    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress, Some(joined)))
+}
+
+fn run_here(
+    pipeline: &Pipeline,
+    settings: &Settings,
+    progress: &dyn Progress,
+    joined: Option<Joined>,
+) -> Result<Report, RunError> {
     let began = Instant::now();
     let plan = &pipeline.plan;
     let opencl = match &settings.backend {
@@ -94,6 +119,9 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     let keys = Keys::new(plan);
     let text = provenance::text(pipeline, &keys);
     let made_by = MadeBy { told: keys.hash(&text), folder: folder(pipeline) };
+    if let Some(joined) = &joined {
+        pieces::check(pipeline, &keys, &text, joined)?;
+    }
     let mut book = Book::open(plan, &keys, made_by, settings.force);
     check_resources(pipeline, &book)?;
     let running = progress.stage("scene", 0);
@@ -113,13 +141,17 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
     if book.anything() {
         io::check_writable(&plan.out)?;
     }
+    if plan.piece.is_some() {
+        pieces::tell(plan, &text)?;
+    }
     book.retell(plan, &text)?;
     let building = began.elapsed();
     let loaded = plan.all::<OcclusionPlan>().zip(loaded).filter_map(|((stage, _), found)| Some((stage, found?)));
     let loaded = loaded.collect();
     let force = settings.force;
     let (told, times) = (&*text, BTreeMap::new());
-    let mut run = Schedule { pipeline, told, opencl, progress, book: &mut book, loaded, force, times };
+    let work = Work::default();
+    let mut run = Schedule { pipeline, told, opencl, progress, book: &mut book, loaded, force, joined, work, times };
     for (((scene, _), mesh), notes) in plan.all::<ScenePlan>().zip(meshes).zip(notes) {
         match mesh {
             Some(AnyMesh::Three(mesh)) => run.scene(scene, mesh, notes, building)?,
@@ -130,8 +162,9 @@ fn run_here(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -
         }
     }
     run.last()?;
-    let mut times = run.times;
+    let (mut times, work) = (run.times, run.work);
     let mut report = book.report();
+    (report.work, report.piece) = (work, plan.piece.map(|piece| piece.to_string()));
     for (index, stage) in plan.stages.iter().enumerate() {
         let (time, detail) = times.remove(&index).unwrap_or_default();
         report.stage(format!("{} {}", plan.kind(index), stage.id), time, detail);
@@ -160,6 +193,8 @@ fn check_resources(pipeline: &Pipeline, book: &Book) -> Result<(), RunError> {
         return Err(RunError::Memory { stage: name, holds, needed: *memory, available });
     }
     let disk = needs.iter().fold(0, |sum: u64, (needs, _)| sum.saturating_add(needs.disk));
+    // About its share.
+    let disk = disk / plan.piece.map_or(1, |piece| piece.count() as u64);
     Ok(io::check_free_space(&plan.out, disk)?)
 }
 
@@ -172,6 +207,8 @@ struct Schedule<'p> {
     book: &'p mut Book,
     loaded: BTreeMap<Ref<OcclusionPlan>, Loaded>,
     force: bool,
+    joined: Option<Joined>,
+    work: Work,
     times: BTreeMap<usize, (Duration, String)>,
 }
 
@@ -234,10 +271,12 @@ impl Schedule<'_> {
             ledger: self.book,
             loaded: std::mem::take(&mut self.loaded),
             force: self.force,
+            joined: self.joined.clone(),
+            work: self.work,
             early: BTreeMap::new(),
         };
         let detail = work(&mut run)?;
-        self.loaded = run.loaded;
+        (self.loaded, self.work) = (run.loaded, run.work);
         // Values that a picture needed are told at the occlusion they are of.
         for (index, (_, detail)) in run.early {
             self.times.entry(index).or_default().1 = detail;

@@ -66,6 +66,15 @@ pub struct Slab {
     pub behind: u64,
 }
 
+/// What is known of a picture, or of some of its layers, when they are made.
+#[derive(Debug)]
+pub struct Rendered<const D: usize> {
+    /// The voxels at which it is to be looked at again, if that was asked for.
+    pub audit: Option<Audit<D>>,
+    /// Voxels whose shade was found, with those beyond the layers that were asked for, which filters look at.
+    pub voxels: u64,
+}
+
 impl<const D: usize> Renderer<D> {
     /// A picture with one sample a voxel and no filter.
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
@@ -103,9 +112,27 @@ impl<const D: usize> Renderer<D> {
         aovs: &[Aov],
         thickness: Option<usize>,
         progress: &dyn Progress,
-        mut sink: impl FnMut(Slab) -> Result<(), E>,
+        sink: impl FnMut(Slab) -> Result<(), E>,
     ) -> Result<Option<Accuracy>, E> {
-        let depth = self.grid.dimensions[2];
+        let made = self.render_layers(0..self.grid.dimensions[2], None, aovs, thickness, progress, sink)?;
+        Ok(made.audit.map(|audit| audit.finish(&*self.backend, progress)).transpose()?.flatten())
+    }
+
+    /// The same for some layers of the picture. No slab reaches from before the layer `border` to behind it; audited is
+    /// what lies before it.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn render_layers<E: From<Error>>(
+        &self,
+        wanted: Range<usize>,
+        border: Option<usize>,
+        aovs: &[Aov],
+        thickness: Option<usize>,
+        progress: &dyn Progress,
+        mut sink: impl FnMut(Slab) -> Result<(), E>,
+    ) -> Result<Rendered<D>, E> {
+        let border = border.unwrap_or(wanted.end).clamp(wanted.start, wanted.end);
         let thickness = thickness.unwrap_or_else(|| self.layers_within(SLAB_BYTES, aovs)).max(1);
         let sampling = Sampling::new(&self.camera, &self.grid, self.supersample);
         let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
@@ -140,7 +167,9 @@ impl<const D: usize> Renderer<D> {
             most: self.layers,
             occluded: aovs.contains(&Aov::LayerAmbientOcclusion),
         });
+        let mut voxels = 0;
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
+            voxels += (layers.len() * self.grid.layer_len()) as u64;
             let mut buffer = pass.layers(layers, columns, progress)?;
             if columns.intersects(behind::COLUMNS) {
                 behind::add(&pass, &*self.backend, &mut buffer, progress)?;
@@ -162,15 +191,18 @@ impl<const D: usize> Renderer<D> {
             Ok(buffer)
         };
         let mut audit = self.audit.map(Audit::new);
-        let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
-        for first in (0..depth).step_by(thickness) {
-            let mut buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+        let mut chain = Chain::new(self.grid.dimensions, wanted.start, columns, &self.filters);
+        let mut first = wanted.start;
+        while first < wanted.end {
+            let end = if first < border { border } else { wanted.end };
+            let mut buffer = chain.next(end.min(first + thickness), &mut source, progress)?;
+            first = buffer.layers().end;
             shine(self.skylight.as_deref(), &mut buffer);
             let layers = layered.as_ref().map(|pass| pass.layers(buffer.layers(), progress)).transpose()?;
             let layers = layers.unwrap_or_default();
             buffer.passages.iter_mut().enumerate().for_each(|(i, count)| *count = layers.count(i));
             let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
-            if let Some(audit) = &mut audit {
+            if let Some(audit) = audit.as_mut().filter(|_| first <= border) {
                 audit.add(&buffer);
             }
             let arrays = aovs.iter().flat_map(|aov| aov.arrays(&buffer, &layers)).collect();
@@ -178,7 +210,7 @@ impl<const D: usize> Renderer<D> {
             let behind = buffer.simplex.iter().filter(|&&simplex| is_behind(simplex)).count() as u64;
             sink(Slab { layers: buffer.layers(), arrays, seen, behind })?;
         }
-        Ok(audit.map(|audit| audit.finish(&*self.backend, progress)).transpose()?.flatten())
+        Ok(Rendered { audit, voxels })
     }
 
     /// The whole picture in memory.

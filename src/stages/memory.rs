@@ -70,6 +70,8 @@ pub fn picture<const D: usize>(
         ledger: &mut ledger,
         loaded: Default::default(),
         force: false,
+        joined: None,
+        work: Default::default(),
         early: Default::default(),
     };
     let mut scene = SceneRun::new(session);
@@ -90,7 +92,7 @@ pub fn picture<const D: usize>(
     }
     let skylight = scene.skylight(render.occlusion, render.light_asked(arrays), &run)?;
     let (found, mut grid) = (Rc::new(RefCell::new(Vec::<Array>::new())), None);
-    let made = render.picture("render", plan, &scene, skylight, progress, |size, _| {
+    let made = render.picture(("render", None), plan, &scene, skylight, progress, |size, _| {
         grid = Some(*size);
         Ok(PictureFiles::memory(arrays, render.layers, Rc::clone(&found)))
     })?;

@@ -35,6 +35,7 @@ pub mod occlusion;
 mod one_or_many;
 pub mod paraview;
 mod picture;
+pub mod piece;
 mod plan;
 pub mod prepare;
 pub mod projection;
@@ -66,9 +67,10 @@ pub use describe::{Counts, Totals};
 pub use error::{Invalid, StageError};
 pub use key::{Keys, LeftOut, Output};
 pub use one_or_many::OneOrMany;
+pub use piece::Piece;
 pub use plan::{Plan, Planned, Ref};
 pub use resolve::Resolver;
-pub use run::{Ledger, Made, Run, SceneRun};
+pub use run::{Ledger, Made, Run, SceneRun, Work};
 
 /// Coordinates and lengths beyond this are refused: their squares must stay far inside `f32`.
 pub const MAX_LENGTH: f64 = 1e12;
@@ -142,6 +144,18 @@ pub trait Stage: plan::OfKind + Serialize {
     /// The files that it leaves and the cache knows, each with its key.
     fn outputs(_me: Ref<Self>, _plan: &Plan, _keys: &Keys) -> Vec<Output> {
         Vec::new()
+    }
+
+    /// The files that a piece of a run leaves in the place of those, each with its key. What isn't among them is made when
+    /// all pieces are joined.
+    fn parts(_me: Ref<Self>, _plan: &Plan, _keys: &Keys, _piece: Piece) -> Vec<Output> {
+        Vec::new()
+    }
+
+    /// Pictures of its own that show values at vertices, of those that a piece of a run makes: in a piece their vertices are
+    /// wanted, not all.
+    fn pictures(_me: Ref<Self>, _plan: &Plan, _piece: Piece) -> Option<Vec<(PathBuf, render::RenderPlan)>> {
+        None
     }
 
     /// Puts another text in the place of the one that a file of its outputs tells of the pipeline; the rest of the file
@@ -294,6 +308,14 @@ macro_rules! stages {
 
             pub fn outputs(&self, index: usize, keys: &Keys) -> Vec<Output> {
                 match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::outputs(self.at(index), self, keys)),+ }
+            }
+
+            fn parts(&self, index: usize, keys: &Keys, piece: Piece) -> Vec<Output> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::parts(self.at(index), self, keys, piece)),+ }
+            }
+
+            fn pictures(&self, index: usize, piece: Piece) -> Option<Vec<(PathBuf, render::RenderPlan)>> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::pictures(self.at(index), self, piece)),+ }
             }
 
             pub fn retell(&self, index: usize, output: &Path, text: &str) -> Result<u64, io::Error> {

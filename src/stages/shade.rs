@@ -17,8 +17,9 @@ use serde_json::{Value, json};
 use super::camera::{self, CameraPlan, CameraSpec};
 use super::describe::{Counts, grouped};
 use super::lighting::{self, SkySpec};
+use super::piece::Piece;
 use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
-use super::write::{PROGRAM, vti as picture};
+use super::write::{Encoding, PROGRAM, vti as picture};
 use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, Stage, StageError};
 use crate::geometry::{Dimension, Vector, Vector64, widen};
 use crate::io::{self, AtomicFile, PIPELINE, vti, vtk};
@@ -194,6 +195,11 @@ impl Stage for ShadePlan {
         vec![Output::alone(&plan[me].file, keys.of(me.index()).to_owned())]
     }
 
+    /// One piece makes it.
+    fn parts(me: Ref<Self>, plan: &Plan, keys: &Keys, piece: Piece) -> Vec<Output> {
+        if piece.owns(me.nth()) { Self::outputs(me, plan, keys) } else { Vec::new() }
+    }
+
     fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
         picture::retell(&plan.out.join(output), text)
     }
@@ -234,6 +240,12 @@ impl Stage for ShadePlan {
         let (plan, shade) = (run.plan, &run.plan[me]);
         if !run.is_stale(&shade.file) {
             return Ok("as it was".to_owned());
+        }
+        if let Some(joined) = &run.joined {
+            let (part, path) = (joined.owned(&shade.file, me.nth()), plan.out.join(&shade.file));
+            let bytes = picture::take(&part, &path, Encoding::Appended, run.told)?;
+            run.made(&shade.file, bytes, Vec::new())?;
+            return Ok("made by one piece".to_owned());
         }
         // It was read before, but may have changed since.
         let image = shade.read().map_err(|message| Invalid::new(format!("{}.image", plan.path(me)), message))?;

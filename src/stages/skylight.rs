@@ -6,11 +6,12 @@
 use std::sync::Arc;
 
 use super::lighting::{LightAsked, LightingPlan};
-use super::occlusion::OcclusionPlan;
-use super::{Ref, Run, SceneRun, StageError};
-use crate::geometry::Vector64;
+use super::occlusion::{OcclusionPlan, OcclusionSource};
+use super::{Ref, Run, SceneRun, StageError, write};
+use crate::geometry::{Vector, Vector64};
 use crate::occlusion::{Directional, Estimator};
 use crate::render::{Skylight, radiosity};
+use crate::trace::ShadingPoint;
 
 impl<const D: usize> SceneRun<D> {
     /// The occlusion of all vertices with directions.
@@ -26,6 +27,51 @@ impl<const D: usize> SceneRun<D> {
         let found = Arc::new(self.session.directional(estimator(of, run), run.progress)?);
         self.directions.insert(of, Arc::clone(&found));
         Ok(found)
+    }
+
+    /// The vectors b at a mesh's vertices, for a file of it: of all, or of those that a piece of a run shows; elsewhere they
+    /// are zero.
+    ///
+    /// # Errors
+    /// As [`SceneRun::directions`].
+    pub(super) fn directions_of_mesh(
+        &mut self,
+        of: Ref<OcclusionPlan>,
+        run: &Run,
+    ) -> Result<Vec<Vector<D>>, StageError> {
+        let mesh = Arc::clone(self.session.mesh());
+        let computed = matches!(run.plan[of].source, OcclusionSource::Compute(_));
+        if let Some(joined) = run.joined.as_ref().filter(|_| computed) {
+            let found = joined.values(of.nth(), mesh.vertices.len())?.vectors;
+            return Ok(found.chunks_exact(D).map(Vector::from_column_slice).collect());
+        }
+        let Some(piece) = run.plan.piece else { return Ok(self.directions(of, run)?.vectors.clone()) };
+        let own = piece.share(mesh.vertices.len());
+        let simplices = mesh.simplices.iter().filter(|simplex| write::has_first(&own, simplex));
+        let mut shown: Vec<usize> = simplices.flatten().map(|&v| v as usize).collect();
+        shown.sort_unstable();
+        shown.dedup();
+        let mut all = vec![Vector::zeros(); mesh.vertices.len()];
+        for (&v, found) in shown.iter().zip(self.vectors_at(of, shown.clone(), run)?) {
+            all[v] = found;
+        }
+        Ok(all)
+    }
+
+    /// The vectors b at these vertices.
+    ///
+    /// # Errors
+    /// As [`SceneRun::directions`].
+    pub(super) fn vectors_at(
+        &self,
+        of: Ref<OcclusionPlan>,
+        vertices: Vec<usize>,
+        run: &Run,
+    ) -> Result<Vec<Vector<D>>, StageError> {
+        let _running = run.progress.stage(&format!("directions of {}", run.plan.id(of)), vertices.len() as u64);
+        let points: Vec<ShadingPoint<D>> = vertices.into_iter().map(|v| ShadingPoint::Vertex(v as u32)).collect();
+        let backend = self.session.backend()?;
+        Ok(estimator(of, run).directional(&**backend, &points, None, run.progress)?.vectors)
     }
 
     /// The light that a picture with this occlusion needs; none if that of an even sky will do.

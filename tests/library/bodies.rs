@@ -7,6 +7,7 @@ use std::path::Path;
 use ao4d::geometry::{Dimension, Vector, Vector64, normal_of};
 use ao4d::io::vtk;
 use ao4d::mesh::edges::{Edges, edges};
+use ao4d::mesh::peel::Hopf;
 use ao4d::mesh::section::{Hyperplane, Section, section};
 use ao4d::mesh::topology::{corners, enclosed_volume, facet_pairs, singular_vertices, surface_measure, worst_quality};
 use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
@@ -688,7 +689,7 @@ fn wireframes_are_seen_by_the_render_s_camera() {
   - wireframe: {vtp: away.vtp}
 ";
     let notes = run_stages(out, stages).unwrap();
-    assert_eq!(notes, ["wireframe-4: all edges are behind the eye, or nearer than `near`"]);
+    assert_eq!(notes, ["wireframe-4: all edges are behind the eye, nearer than `near`, or hidden"]);
     // The default camera's image axes are x, y and z; it looks along -w.
     let check = |file: &str, eye: f64, perspective: bool, lines: usize| {
         let mesh = read_mesh(&out.join(file));
@@ -761,11 +762,258 @@ fn slices_and_wireframes_are_refused_by_name() {
             "render: {dimensions: [1, 1, 1]}\n  - wireframe: {vtp: a.vtp, near: 0}",
             "near: expected a number above 0, found 0",
         ),
+        ("slice: {vtp: a.vtp, peel: hopf, at: 90}", "at: expected more than 0 and less than 90 degrees, found 90"),
+        ("slice: {vtp: a.vtp, peel: hopf, range: [0, 80], count: 3}", "range[0]: expected more than 0"),
+        ("slice: {vtp: a.vtp, peel: hopf, axis: [0, 0, 0]}", "axis: the axis is zero"),
+        ("slice: {vtp: a.vtp, axis: [0, 0, 1]}", "axis: is for `peel: hopf` alone; take it out"),
+        ("slice: {vtp: a.vtp, peel: w, normal: [0, 0, 0, 1]}", "normal: `peel` says already along what it is cut"),
+        ("slice: {vtp: a.vtp, peel: hopf, projection: plane}", "projection: a torus of Hopf lies in no hyperplane"),
+        ("slice: {vtp: a.vtp, projection: camera}", "projection: slices are shown in their own `plane`"),
+        ("slice: {vtp: a.vtp, pole: [0, 0, 0, 1]}", "pole: is for `projection: stereographic`"),
+        ("slice: {vtp: a.vtp, peel: hopf, center: [0, 0, 1]}", "center: expected 4 numbers (the scene is 4D), found 3"),
+        ("slice: {vtp: a.vtp, peel: hopf, pole: [0, 0, 0, 0]}", "pole: the pole is zero, and that is no direction"),
+        ("slice: {vtp: a.vtp, peel: hops}", "did you mean `hopf`?"),
+        // What is seen only when it runs: the pole on the slice, the centre on an edge.
+        (
+            "slice: {vtp: a.vtp, projection: stereographic, pole: [0, 0, 1, 0]}",
+            "pole: the pole of the projection, from the centre in direction [0.0, 0.0, 1.0, 0.0], lies on what is shown of",
+        ),
+        (
+            "wireframe: {vtp: a.vtp, projection: stereographic, center: [0.5, 0.5, 0.5, 0]}",
+            "center: the centre of the projection, [0.5, 0.5, 0.5, 0.0], lies on what is shown of",
+        ),
+        ("wireframe: {vtp: a.vtp, projection: plane}", "projection: edges lie in no common hyperplane"),
+        ("wireframe: {vtp: a.vtp, projection: stereographic, near: 1}", "near: is for what a camera sees"),
+        ("wireframe: {vtp: a.vtp, projection: stereographic, hidden: mark}", "hidden: is for what a camera sees"),
+        (
+            "render: {dimensions: [1, 1, 1]}\n  - wireframe: {vtp: a.vtp, center: [0, 0, 0, 0]}",
+            "center: is for `projection: stereographic`",
+        ),
+        (
+            "wireframe: {id: e, projection: stereographic, vtp: a.vtp}\n  - paraview: {input: e, state: a.py, edges: {color_by: depth}}",
+            "edges.color_by: `e` is projected stereographically and has no depth",
+        ),
+        (
+            "wireframe: {id: e, projection: stereographic, vtp: a.vtp}\n  - paraview: {input: e, state: a.py, edges: {over: e}}",
+            "edges.over: `e` is projected stereographically, as no image is; name it in `input`",
+        ),
+        (
+            "render: {dimensions: [1, 1, 1]}\n  - write: {vti: a.vti}\n  - paraview: {state: a.py, edges: {}}",
+            "edges: there is no earlier `wireframe` that a camera sees; put one first",
+        ),
+        (
+            "render: {dimensions: [1, 1, 1]}\n  - write: {vti: a.vti}\n  - wireframe: {vtp: a.vtp}\n  - paraview: {state: a.py, edges: {skin: 2}}",
+            "edges.skin: expected a number from 0 to 1, found 2",
+        ),
     ] {
         let error = run_stages(folder.path(), &format!("{four}  - {stage}\n")).expect_err(stage);
         assert!(error.contains(message), "{stage}: {error}");
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written");
+    let written = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    let results: Vec<_> = written.filter(|name| !name.to_string_lossy().starts_with('.')).collect();
+    assert!(results.is_empty(), "nothing is written: {results:?}");
+    let three = "  - scene: {dimension: 3, objects: [{sphere: {radius: 1, subdivisions: 2}}]}\n";
+    let error = run_stages(folder.path(), &format!("{three}  - slice: {{vtp: a.vtp, peel: w}}\n")).unwrap_err();
+    assert!(error.contains("peel: the scene is 3D, and peels are of hyperspheres in 4D"), "{error}");
+}
+
+/// The area of a file's triangles, and what they enclose, in the file's own points.
+fn sizes_of(mesh: &vtk::UnstructuredGrid) -> [f64; 2] {
+    let points: Vec<Vector64<3>> = mesh.points.iter().map(|&p| p.into()).collect();
+    let faces: Vec<[u32; 3]> = mesh.cells().map(|(_, c)| std::array::from_fn(|i| c[i] as u32)).collect();
+    assert!(facet_pairs(&faces).is_closed());
+    [surface_measure(corners(&points, &faces)), enclosed_volume(corners(&points, &faces))]
+}
+
+#[test]
+fn peels_of_a_hypersphere_are_the_tori_of_hopf() {
+    // At the angle a the torus is a product of circles of radii cos a and sin a, whatever the axis.
+    let mesh = mesh_of::<4>(json!({"hypersphere": {"radius": 1, "subdivisions": 10, "center": [0.5, 0, 0, -1]}}));
+    for axis in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [-0.6, 0.8, 1.0]] {
+        for degrees in [20.0f64, 45.0, 70.0] {
+            let peel = Hopf::new([0.5, 0.0, 0.0, -1.0].into(), axis, degrees).unwrap();
+            let found = section(&mesh, &peel, None);
+            let pairs = facet_pairs(&found.faces);
+            assert!(pairs.is_closed() && pairs.is_manifold(), "{axis:?} {degrees}: {pairs:?}");
+            let f_vector = ao4d::mesh::topology::f_vector(&found.faces);
+            assert_eq!(f_vector[0] + f_vector[2], f_vector[1], "a torus: {axis:?} {degrees}");
+            let points: Vec<Vector64<4>> = found.points.iter().map(|point| point.position(&mesh)).collect();
+            let triangle = |face: &[u32; 3]| {
+                let [a, b, c] = face.map(|i| points[i as usize]);
+                let (u, v) = (b - a, c - a);
+                0.5 * (u.norm_squared() * v.norm_squared() - u.dot(&v).powi(2)).sqrt()
+            };
+            let area: f64 = found.faces.iter().map(triangle).sum();
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            near(area, 4.0 * PI * PI * sine * cosine, 0.04);
+        }
+    }
+    // By the stereographic projection from w each is a ring torus around the circle in xy, with radii 1 / cos a and
+    // tan a, that faces outwards.
+    let folder = tempfile::tempdir().unwrap();
+    let notes = run_stages(
+        folder.path(),
+        "  - scene: {objects: [{hypersphere: {radius: 2, subdivisions: 12}, transform: [{translate: [0, 1, 0, 0]}]}]}
+  - occlusion: {samples: 4}
+  - slice: {peel: hopf, center: [0, 1, 0, 0], range: [30, 60], count: 3, vtp: peel.vtp}
+  - slice: {peel: hopf, center: [0, 1, 0, 0], axis: [1, 0, 0], vtp: other.vtp}
+  - slice: {peel: w, at: -0.5, center: [0, 1, 0, 0], projection: stereographic, vtp: w.vtp}
+  - slice: {id: lost, peel: hopf, center: [9, 9, 9, 9], at: 1, pole: [0, 0, 1, 0], vtp: lost.vtp}
+",
+    )
+    .unwrap();
+    assert_eq!(notes, ["lost: the torus meets nothing; the file is empty. Is `center` within the body?"]);
+    for (i, degrees) in [30.0f64, 45.0, 60.0].into_iter().enumerate() {
+        let mesh = read_mesh(&folder.path().join(format!("peel-{i}.vtp")));
+        let (major, minor) = (1.0 / degrees.to_radians().cos(), degrees.to_radians().tan());
+        let [area, volume] = sizes_of(&mesh);
+        near(area, 4.0 * PI * PI * major * minor, 0.05);
+        near(volume, 2.0 * PI * PI * major * minor * minor, 0.05);
+        // Convex bodies are open everywhere, and points are where they are said to be.
+        assert!(array(&mesh, "ambient_occlusion").iter().all(|&a| a == 1.0));
+        for (image, p) in mesh.points.iter().zip(array(&mesh, "position").chunks(4)) {
+            let p = [p[0], p[1] - 1.0, p[2], p[3]];
+            let length = p.iter().map(|x| x * x).sum::<f64>().sqrt();
+            assert!((0.9 * 2.0..=2.0 + 1e-6).contains(&length));
+            let expected: Vec<f64> = p[..3].iter().map(|x| x / length / (1.0 - p[3] / length)).collect();
+            assert!(expected.iter().zip(image).all(|(a, b)| (a - b).abs() < 1e-4), "{expected:?} {image:?}");
+            let angle = p[2].hypot(p[3]).atan2(p[0].hypot(p[1])).to_degrees();
+            assert!((angle - degrees).abs() < 1e-3, "{angle}");
+        }
+    }
+    assert!(sizes_of(&read_mesh(&folder.path().join("other.vtp")))[0] > 10.0);
+    // A circle of latitude's sphere is a sphere: w = -1/2 of 2 comes to one of radius tan(1/2 acos(1/4)), which is
+    // sqrt(0.75 / 1.25), and faces outwards, to larger w.
+    let radius = (0.75f64 / 1.25).sqrt();
+    let [area, volume] = sizes_of(&read_mesh(&folder.path().join("w.vtp")));
+    near(area, 4.0 * PI * radius.powi(2), 0.03);
+    near(volume, 4.0 / 3.0 * PI * radius.powi(3), 0.03);
+}
+
+#[test]
+fn edges_tell_whether_they_are_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let eye = [1.5, -0.4, 0.3, 3.0];
+    let stages = "  - scene: {id: s, objects: [{tesseract: {size: 2}}]}
+  - render: {id: r, occlusion: none, dimensions: [20, 20, 20], camera: {eye: [1.5, -0.4, 0.3, 3], target: [0, 0, 0, 0]}}
+  - wireframe: {vtp: marked.vtp}
+  - wireframe: {hidden: leave_out, vtp: seen.vtp}
+  - wireframe: {hidden: ignore, vtp: all.vtp}
+  - wireframe: {input: s, projection: stereographic, pole: [0.1, 0.2, 0.3, 1], vtp: arcs.vtp}
+  - scene: {id: flat, dimension: 3, objects: [{box: {min: [-2, -2, -3], max: [2, 2, -2]}}, {box: {min: [1.5, -0.5, 0], max: [2.5, 0.5, 0.2]}}]}
+  - render: {id: f, input: flat, occlusion: none, dimensions: [400, 400], camera: {projection: parallel, eye: [0, 0, 4], target: [0, 0, 0], height: 8}}
+  - wireframe: {vtp: flat.vtp}
+";
+    assert_eq!(run_stages(out, stages).unwrap(), Vec::<String>::new());
+    let visible = |mesh: &vtk::UnstructuredGrid| -> Vec<bool> {
+        let array = mesh.cell_arrays.iter().find(|a| a.name == "visible").expect("visible");
+        array.values.to_f64().iter().map(|&v| v == 1.0).collect()
+    };
+    let middles = |mesh: &vtk::UnstructuredGrid, count: usize| -> Vec<Vec<f64>> {
+        let position = array(mesh, "position");
+        let middle = |c: &[u32]| {
+            (0..count).map(|a| c.iter().map(|&i| position[count * i as usize + a]).sum::<f64>() / 2.0).collect()
+        };
+        mesh.cells().map(|(_, c)| middle(c)).collect()
+    };
+    // An edge of a convex body is seen if one of its cells faces the eye; none is seen in part.
+    let marked = read_mesh(&out.join("marked.vtp"));
+    let seen = visible(&marked);
+    assert_eq!(seen.len(), 32);
+    for (p, seen) in middles(&marked, 4).iter().zip(&seen) {
+        let faces = (0..4).any(|a| p[a].abs() > 0.99 && p[a].signum() * eye[a] > 1.0);
+        assert_eq!(*seen, faces, "{p:?}");
+    }
+    let count = seen.iter().filter(|&&seen| seen).count();
+    assert!(count > 10 && count < 32, "{count}");
+    assert_eq!(read_mesh(&out.join("seen.vtp")).cells().count(), count);
+    let all = read_mesh(&out.join("all.vtp"));
+    assert!(all.cell_arrays.is_empty() && all.cells().count() == 32);
+    // What a box in front covers of the edges behind is hidden, to a pixel.
+    let flat = read_mesh(&out.join("flat.vtp"));
+    let (mut hidden, mut rest) = (0.0, 0.0);
+    let position = array(&flat, "position");
+    for ((_, ends), seen) in flat.cells().zip(visible(&flat)) {
+        let [a, b] = [0, 1].map(|k| &position[3 * ends[k] as usize..][..3]);
+        if [a, b].iter().all(|p| p[0] == 2.0 && p[2] == -2.0) {
+            let covered = (a[1] + b[1]).abs() < 1.0;
+            assert_eq!(seen, !covered, "{a:?} {b:?}");
+            *(if seen { &mut rest } else { &mut hidden }) += (a[1] - b[1]).abs();
+        }
+    }
+    assert!((hidden - 1.0f64).abs() <= 0.04 && (rest + hidden - 4.0f64).abs() < 1e-6, "{hidden} {rest}");
+    // Arcs lie on the images of great circles: each point is the projection of a point of its edge.
+    let arcs = read_mesh(&out.join("arcs.vtp"));
+    assert!(arcs.point_array("depth").is_none() && arcs.cells().count() > 32 * 8);
+    for p in array(&arcs, "position").chunks(4) {
+        let on_edge = p.iter().filter(|x| (x.abs() - 1.0).abs() < 1e-6).count();
+        assert!(on_edge >= 3, "{p:?}");
+    }
+    let longest = arcs.cells().map(|(_, c)| {
+        let [a, b] = [arcs.points[c[0] as usize], arcs.points[c[1] as usize]];
+        (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+    });
+    assert!(longest.fold(0.0, f64::max) < 0.6);
+}
+
+#[test]
+fn slabs_are_closed_and_add_up_to_the_body() {
+    fn check<const D: usize>(object: Value) {
+        let whole = volume(&build::<D>(object.clone()));
+        for normal in [[0.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0], [0.5, -0.7, 0.6, 0.3]] {
+            let normal = if D == 3 && normal[3] == 1.0 { [0.0, 0.0, 1.0, 0.0] } else { normal };
+            let part = |from: Option<f64>, to: Option<f64>| {
+                let mut slab = json!({"normal": normal[..D].to_vec()});
+                from.into_iter().for_each(|x| slab["from"] = json!(x));
+                to.into_iter().for_each(|x| slab["to"] = json!(x));
+                let mut object = object.clone();
+                object["slab"] = slab;
+                let part = build::<D>(object.clone());
+                let pairs = facet_pairs(&part.simplices);
+                assert!(pairs.is_closed(), "{object}: {pairs:?}");
+                // It stays where it is to be.
+                for vertex in &part.vertices {
+                    let height: f64 = vertex.iter().zip(normal).map(|(x, n)| x * n).sum();
+                    assert!(from.is_none_or(|c| height > c - 1e-6) && to.is_none_or(|c| height < c + 1e-6), "{height}");
+                }
+                volume(&part)
+            };
+            let parts = [part(None, Some(-0.21)), part(Some(-0.21), Some(0.13)), part(Some(0.13), None)];
+            assert!(parts.iter().all(|&v| v > 0.0), "{object} {normal:?}: {parts:?}");
+            near(parts.iter().sum(), whole, 1e-6);
+        }
+    }
+    let notch = |d: usize| {
+        let cuts = json!([{"from": vec![-0.3; d], "to": vec![2; d]}]);
+        json!({"cut_cube": {"min": vec![-1; d], "max": vec![1; d], "cuts": cuts, "subdivisions": 2}})
+    };
+    let groove = json!({"cut_cube": {"min": [-1, -1, -1, -1], "max": [1, 1, 1, 1],
+        "cuts": [{"from": [-0.3, 0, -2, -2], "to": [0.3, 2, 2, 2]}]}});
+    check::<3>(notch(3));
+    check::<3>(json!({"sphere": {"radius": 1, "subdivisions": 6}}));
+    check::<3>(isosurface(json!({"torus": {"major": 1, "minor": 0.4}}), 12));
+    check::<4>(json!({"box": {"min": [-1, -1, -1, -1], "max": [1, 1, 1, 1], "subdivisions": 2}}));
+    check::<4>(json!({"polytope": {"cells": 24}}));
+    check::<4>(json!({"hypersphere": {"radius": 1, "subdivisions": 4}}));
+    check::<4>(notch(4));
+    check::<4>(groove);
+    // Along the layers of a body's own vertices: of the tesseract's eight layers two are left, with all its corners.
+    let slab = json!({"tesseract": {"size": 1, "subdivisions": 8}, "slab": {"from": -0.125, "to": 0.125}});
+    let surface = build::<4>(slab);
+    assert!(facet_pairs(&surface.simplices).is_closed());
+    near(volume(&surface), 0.25, 1e-12);
+    near(area(&surface), 2.0 + 6.0 * 0.25, 1e-12);
+    for (slab, message) in [
+        (json!({}), "slab: a slab lies between two hyperplanes: give it `from`, `to`, or both"),
+        (json!({"from": 1, "to": 1}), "slab.to: expected a number above `from`, 1, found 1"),
+        (json!({"from": 5}), "slab: the body has no part between 5 and infinity"),
+        (json!({"to": 0, "normal": [0, 0, 0, 0]}), "slab.normal: the normal is zero"),
+        (json!({"to": 0, "normal": [0, 0, 1]}), "slab.normal: expected 4 numbers"),
+    ] {
+        let found = refusal::<4>(json!({"tesseract": {"size": 1}, "slab": slab}));
+        assert!(found.contains(message), "{found}");
+    }
 }
 
 /// An object as a scene of its own.

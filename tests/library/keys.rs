@@ -31,7 +31,10 @@ stages:
   - mesh: {id: m, input: s, occlusion: none, vtu: m.vtu}
   - slice: {id: c, input: s, occlusion: none, normal: [0, 0, 0, 1], at: 0.1, vtp: c.vtp}
   - slice: {id: cs, input: s, occlusion: none, range: [0, 1], count: 3, vtp: cs.vtp}
-  - wireframe: {id: wire, input: r, edges: feature, angle: 20, near: 0.1, vtp: wire.vtp}
+  - slice: {id: h, input: s, occlusion: none, peel: hopf, axis: [0, 0, 1], center: [0, 0, 0, -1], projection: stereographic, pole: [0, 0, 0, 1], vtp: h.vtp}
+  - slice: {id: w1, input: s, occlusion: none, projection: plane, vtp: w1.vtp}
+  - wireframe: {id: wire, input: r, edges: feature, angle: 20, near: 0.1, hidden: mark, vtp: wire.vtp}
+  - wireframe: {id: arcs, input: s, projection: stereographic, center: [0, 0, 0, -1], pole: [0, 0, 0, 1], vtp: arcs.vtp}
   - animate: {id: an, input: r, frames: 3, moves: scene, turn: {plane: xw, from: 0, to: 90, center: [0, 0, 0, -1]}, move: {from: [0, 0, 0, 0], to: [0, 0, 0, 1]}, scan: [0, 0.1], rate: 24, vti: an.vti, arrays: [rgba, opacity], encoding: appended, compression: none}
   - render: {id: space, occlusion: screen_space, screen_space: {slices: 8, steps: 8, thickness: 1, max_distance: 2}, dimensions: [3, 4, 5], input: s}
   - write: {id: w4, input: space, vti: d.vti}
@@ -119,6 +122,11 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("SliceSpec.input", Ok("c.input=other")),
     ("SliceSpec.occlusion", Ok("c.occlusion=o2")),
     ("SliceSpec.normal", Ok("c.normal=[0, 0, 1, 1]")),
+    ("SliceSpec.peel", Ok("w1.peel=w")),
+    ("SliceSpec.axis", Ok("h.axis=[1, 0, 1]")),
+    ("SliceSpec.center", Ok("h.center=[0, 0, 0, -1.1]")),
+    ("SliceSpec.projection", Ok("w1.projection=stereographic")),
+    ("SliceSpec.pole", Ok("h.pole=[0, 0, 1, 1]")),
     ("SliceSpec.at", Ok("c.at=0.2")),
     ("SliceSpec.range", Ok("cs.range=[0, 2]")),
     ("SliceSpec.count", Err("changes which files there are; each file's key has its own place")),
@@ -128,6 +136,10 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("WireframeSpec.edges", Ok("wire.edges=all")),
     ("WireframeSpec.angle", Ok("wire.angle=21")),
     ("WireframeSpec.near", Ok("wire.near=0.2")),
+    ("WireframeSpec.hidden", Ok("wire.hidden=leave_out")),
+    ("WireframeSpec.projection", Err("another projection has other keys; the view as a whole takes part")),
+    ("WireframeSpec.center", Ok("arcs.center=[0, 0, 0, -1.1]")),
+    ("WireframeSpec.pole", Ok("arcs.pole=[0, 0, 1, 1]")),
     ("WireframeSpec.vtp", Err("a file doesn't depend on its name")),
     ("AnimateSpec.id", Err("a name for other stages")),
     ("AnimateSpec.input", Ok("an.input=parallel")),
@@ -161,6 +173,7 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("ShadeSpec.vti", Err("a file doesn't depend on its name")),
     ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.edges", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.state", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.screenshot", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.reader", Err("a state is held against the file that is there, whole")),
@@ -261,6 +274,7 @@ fn every_object_s_field_counts() {
         "s.objects[0].orientation=input",
         "s.objects[0].transform=[{translate: [0, 0, 0, -1.1]}]",
         "s.objects[0].tesseract.size=0.51",
+        "s.objects[0].slab={to: 0.1}",
     ] {
         assert_eq!(differing(&before, &keys(folder.path(), PIPELINE, &[set])), all, "{set}");
     }

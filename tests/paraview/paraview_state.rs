@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use ao4d::io::paraview::{Axis, ColorBy, Cut, Figure, Panel, Source, Style, state};
+use ao4d::io::paraview::{Axis, ColorBy, Cut, Figure, Hidden, Kind, Panel, Source, Style, Tubes, state};
 use ao4d::volume::Grid;
 
 /// A small image: its grid, and the colour of each voxel, none where there is nothing.
@@ -88,9 +88,11 @@ fn axes() -> Image {
 
 fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
     let panel = |&(file, caption, image): &(&str, &str, &Image)| Panel {
-        file: file.into(),
+        kind: Kind::Volume,
+        files: vec![file.into()],
         caption: caption.into(),
-        grid: image.grid,
+        grid: Some(image.grid),
+        edges: None,
     };
     Figure {
         title: "test".into(),
@@ -104,6 +106,7 @@ fn figure(source: Source, panels: &[(&str, &str, &Image)]) -> Figure {
         style: Style::Voxels,
         color_by: ColorBy::Rgba,
         colorbar: false,
+        tubes: None,
     }
 }
 
@@ -230,8 +233,8 @@ fn the_picture_shows_both_volumes_wherever_the_folder_is() {
     without.write_raw(&moved.join("without.raw"));
     let mut raw = figure;
     raw.source = Source::Raw;
-    raw.panels[0].file = "with.raw".into();
-    raw.panels[1].file = "without.raw".into();
+    raw.panels[0].files = vec!["with.raw".into()];
+    raw.panels[1].files = vec!["without.raw".into()];
     write_state(&moved, &raw);
     draw("pvpython", &[&moved.join("figure.py")], elsewhere.path());
     let by_raw = Picture::read(&moved.join("figure.png"));
@@ -448,6 +451,87 @@ fn wrong_files_are_told() {
     write_state(folder.path(), &figure(Source::Vti, &[("a.vti", "", &image)]));
     let text = complaint();
     assert!(text.contains("a.vti has 6 x 6 x 6 voxels, but this state was written for 20 x 20 x 20"), "{text}");
+}
+
+/// A `.vtp` of lines, or of triangles, over points, in characters.
+fn write_polydata(path: &Path, points: &[[f32; 3]], cells: &[Vec<usize>], arrays: &str) {
+    let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(" ");
+    let coordinates = list(&mut points.iter().flatten().map(|x| x.to_string()));
+    let connectivity = list(&mut cells.iter().flatten().map(|i| i.to_string()));
+    let offsets = list(&mut (1..=cells.len()).map(|k| (k * cells[0].len()).to_string()));
+    let lines = cells[0].len() == 2;
+    let (name, lines, polys) = if lines { ("Lines", cells.len(), 0) } else { ("Polys", 0, cells.len()) };
+    let text = format!(
+        r#"<?xml version="1.0"?>
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"><PolyData>
+<Piece NumberOfPoints="{}" NumberOfVerts="0" NumberOfLines="{lines}" NumberOfStrips="0" NumberOfPolys="{polys}">
+{arrays}<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">{coordinates}</DataArray></Points>
+<{name}><DataArray type="Int64" Name="connectivity" format="ascii">{connectivity}</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">{offsets}</DataArray></{name}>
+</Piece></PolyData></VTKFile>"#,
+        points.len()
+    );
+    fs::write(path, text).unwrap();
+}
+
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn edges_are_tubes_beside_volumes_and_over_them() {
+    let folder = scratch();
+    let image = ball(false);
+    image.write_vti(&folder.path().join("ball.vti"));
+    // The middle one of three lines along x is hidden; the distance grows from left to right.
+    let points: Vec<[f32; 3]> = (0..6).map(|k| [[-0.8, 0.8][k % 2], [-0.5, 0.0, 0.5][k / 2], 0.8]).collect();
+    let cells: Vec<Vec<usize>> = (0..3).map(|k| vec![2 * k, 2 * k + 1]).collect();
+    let arrays = r#"<PointData><DataArray type="Float32" Name="depth" format="ascii">1 3 1 3 1 3</DataArray></PointData>
+<CellData><DataArray type="UInt8" Name="visible" format="ascii">1 0 1</DataArray></CellData>"#;
+    write_polydata(&folder.path().join("edges.vtp"), &points, &cells, arrays);
+    // A square of two objects, half of it occluded.
+    let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let arrays = r#"<PointData><DataArray type="Float32" Name="ambient_occlusion" format="ascii">1 1 1 1</DataArray>
+<DataArray type="UInt16" Name="object" format="ascii">1 1 1 1</DataArray></PointData>"#;
+    write_polydata(&folder.path().join("slice.vtp"), &square, &[vec![0, 1, 2], vec![0, 2, 3]], arrays);
+
+    let mut figure = figure(Source::Vti, &[("ball.vti", "", &image)]);
+    let edges = Panel { kind: Kind::Edges, files: vec!["edges.vtp".into()], ..figure.panels[0].clone() };
+    let slices = Panel { kind: Kind::Slices, files: vec!["slice.vtp".into()], grid: None, ..edges.clone() };
+    figure.panels[0].edges = Some("edges.vtp".into());
+    figure.panels.extend([edges, slices]);
+    (figure.style, figure.cut, figure.size) = (Style::Surface, Cut::None, Some([1200, 400]));
+    let mut draw_with = |hidden: Hidden, color_by: Option<&'static str>| {
+        figure.tubes = Some(Tubes { color_by, hidden, radius: Some(0.03), skin: 0.3 });
+        write_state(folder.path(), &figure);
+        draw("pvbatch", &[Path::new("figure.py")], folder.path());
+        Picture::read(&folder.path().join("figure.png"))
+    };
+    let panel = |picture: &Picture, k: usize| picture.part([k as f64 / 3.0, (k + 1) as f64 / 3.0], [0.1, 0.9]);
+    let grey = |c: [u8; 3]| c[0].abs_diff(c[1]) < 8 && c[1].abs_diff(c[2]) < 8;
+    let (dark, pale) = (|c: [u8; 3]| grey(c) && c[0] < 90, |c: [u8; 3]| grey(c) && (130..245).contains(&c[0]));
+    // All alike in ink; then the hidden one thin and pale; then gone.
+    let same = draw_with(Hidden::Same, None);
+    let thin = draw_with(Hidden::Thin, None);
+    let gone = draw_with(Hidden::LeaveOut, None);
+    let [all, thinner, fewer] = [&same, &thin, &gone].map(|picture| count(&panel(picture, 1), dark));
+    assert!(all > 1000 && fewer > 600, "{all} {fewer}");
+    assert!((thinner as f64 / all as f64 - 2.0 / 3.0).abs() < 0.1 && thinner.abs_diff(fewer) < fewer / 10, "{thinner}");
+    let [light, none] = [&thin, &gone].map(|picture| count(&panel(picture, 1), pale));
+    assert!(light > none + 200, "{light} {none}");
+    // Over the volume, whose skin lets them through.
+    assert!(count(&panel(&same, 0), dark) > 600, "no tubes over the volume");
+    let ball = count(&panel(&same, 0), |c| grey(c) && c[0] > 180 && c[0] < 252);
+    assert!(ball > 8000, "the skin is not seen: {ball}");
+    // By depth: dark blue on the left, pale blue on the right.
+    let by_depth = draw_with(Hidden::LeaveOut, Some("depth"));
+    let blue: Vec<_> = panel(&by_depth, 1).into_iter().filter(|p| i32::from(p.1[2]) - i32::from(p.1[0]) > 30).collect();
+    let place = |deep: bool| {
+        let some: Vec<f64> = blue.iter().filter(|p| (p.1[0] < 40) == deep).map(|p| p.0[0]).collect();
+        assert!(some.len() > 50, "{}", some.len());
+        some.iter().sum::<f64>() / some.len() as f64
+    };
+    assert!(place(true) < place(false) - 0.1, "near is dark, on the left");
+    // The slice: its tint, in the third panel.
+    let tint = count(&panel(&same, 2), |c| c[2] > c[0] && c[2] > 120 && c[0] > 60);
+    assert!(tint > 8000, "the slice is not seen: {tint}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::process::Command;
 fn help_texts() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
     let bless = std::env::var_os("AO4D_BLESS").is_some();
-    for verb in ["", "run", "check", "study", "compare", "info", "devices", "schema"] {
+    for verb in ["", "run", "check", "study", "compare", "info", "devices", "schema", "merge"] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ao4d"));
         command.args(Some(verb).filter(|v| !v.is_empty())).arg("--help").env("COLUMNS", "100");
         let output = command.output().unwrap();

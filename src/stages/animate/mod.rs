@@ -22,6 +22,7 @@ use self::path::PathKeys;
 use super::describe::{Counts, Totals, grouped, size};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
 use super::picture::Picture;
+use super::piece::Piece;
 use super::render::{RenderPlan, Shading};
 use super::scene::{Bodies, ScenePlan};
 use super::write::{self, Compression, Encoding, Files, Format, PictureFiles, WritePlan};
@@ -257,6 +258,18 @@ impl Stage for AnimatePlan {
         outputs
     }
 
+    /// A share of the frames, each whole. The list is made when all are there.
+    fn parts(me: Ref<Self>, plan: &Plan, keys: &Keys, piece: Piece) -> Vec<Output> {
+        let own = piece.share(plan[me].files.len());
+        Self::outputs(me, plan, keys).into_iter().skip(own.start).take(own.len()).collect()
+    }
+
+    fn pictures(me: Ref<Self>, plan: &Plan, piece: Piece) -> Option<Vec<(PathBuf, RenderPlan)>> {
+        let animation = &plan[me];
+        let frame = |i: usize| (animation.files[i].clone(), animation.render(i, plan));
+        Some(piece.share(animation.files.len()).map(frame).collect())
+    }
+
     fn retell(me: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
         match Format::Vti.retell() {
             Some(retell) => retell(&plan.out.join(output), &plan[me].write(), text),
@@ -323,7 +336,14 @@ impl Stage for AnimatePlan {
         let animation = &plan[me];
         let stale: Vec<usize> = (0..animation.files.len()).filter(|&i| run.is_stale(&animation.files[i])).collect();
         let mut made = Sum::default();
-        if !stale.is_empty() {
+        if let Some(joined) = run.joined.clone() {
+            for &i in &stale {
+                let file = &animation.files[i];
+                let Some(part) = joined.whole(file, i, animation.files.len()) else { continue };
+                let bytes = write::vti::take(&part, &plan.out.join(file), animation.encoding, run.told)?;
+                run.made(file, bytes, Vec::new())?;
+            }
+        } else if !stale.is_empty() {
             match &animation.moves {
                 Moves::Objects(objects) => move_objects(me, objects, &stale, run, scene, &mut made)?,
                 _ => {
@@ -358,6 +378,9 @@ impl Stage for AnimatePlan {
         if stale.is_empty() {
             return Ok("as it was".to_owned());
         }
+        if let Some(joined) = &run.joined {
+            return Ok(format!("{} of {} frames, of {} pieces", stale.len(), animation.files.len(), joined.count()));
+        }
         let rate = made.voxels as f64 / made.rendering.as_secs_f64() / 1e6;
         let rays = match made.rays {
             0 => String::new(),
@@ -380,6 +403,7 @@ impl Sum {
     /// Counts a frame, and remembers its file. The notes are worded alike for all frames, so that each is told once.
     fn add(&mut self, picture: Picture, name: &str, run: &mut Run) -> Result<(), StageError> {
         self.voxels += picture.voxels;
+        run.work.voxels += picture.voxels;
         self.rendering += picture.rendering;
         let mut notes = Vec::new();
         if let Some(why) = picture.nothing {
@@ -415,7 +439,7 @@ fn frame<const D: usize>(
     let (plan, animation) = (run.plan, &run.plan[me]);
     let name = format!("animate {}, frame {} of {}", plan.id(me), i + 1, animation.files.len());
     let write = animation.write();
-    render.picture(&name, plan, scene, skylight, run.progress, |grid, hash| {
+    render.picture((&name, None), plan, scene, skylight, run.progress, |grid, hash| {
         PictureFiles::frame(&animation.files[i], &write, render, plan, run.told, grid, hash)
     })
 }

@@ -8,7 +8,7 @@ use super::{Content, Format, Opening, VoxelFile, WritePlan};
 use crate::io::Error;
 use crate::render::{Accuracy, Aov};
 use crate::stages::render::RenderPlan;
-use crate::stages::{Plan, Ref};
+use crate::stages::{Plan, Ref, Run};
 use crate::volume::{Array, Grid};
 
 /// The open files of one picture.
@@ -25,15 +25,17 @@ struct Open {
 }
 
 impl PictureFiles {
-    /// Opens those files of a render that have to be made.
+    /// Opens those files of a render that have to be made; of a piece of a run its parts, for a picture that begins with
+    /// `first_layer`.
     pub fn create(
         render: Ref<RenderPlan>,
-        plan: &Plan,
-        told: &str,
-        stale: &dyn Fn(&Path) -> bool,
+        run: &Run,
         grid: &Grid,
+        first_layer: usize,
         mesh_hash: &str,
     ) -> Result<Self, Error> {
+        let Run { plan, told, .. } = run;
+        let stale = &|file: &Path| run.is_stale(file);
         let layers = plan[render].layers;
         let mut aovs: Vec<Aov> = Vec::new();
         // Each is one array, or one a layer.
@@ -48,12 +50,14 @@ impl PictureFiles {
         let mut files = Vec::new();
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == render) {
             for file in write.stale(Content::Voxels, stale) {
-                let path = plan.out.join(&file.path);
+                let name = if plan.piece.is_some() { file.format.part(&file.path) } else { file.path.clone() };
+                let path = plan.out.join(&name);
                 let seen = &plan[render];
+                let opening = Opening { path: &path, plan, write, render: seen, grid, first_layer, mesh_hash, told };
                 let opened =
-                    file.format.open(Opening { path: &path, plan, write, render: seen, grid, mesh_hash, told })?;
+                    if plan.piece.is_some() { file.format.open_part(opening) } else { file.format.open(opening) }?;
                 let places = file.format.arrays(write).into_iter().flat_map(&mut place).collect();
-                files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
+                files.extend(opened.map(|opened| Open { path: name, file: opened, places }));
             }
         }
         Ok(Self { aovs, files })
@@ -70,7 +74,8 @@ impl PictureFiles {
         mesh_hash: &str,
     ) -> Result<Self, Error> {
         let path = plan.out.join(file);
-        let opened = Format::Vti.open(Opening { path: &path, plan, write, render, grid, mesh_hash, told })?;
+        let opening = Opening { path: &path, plan, write, render, grid, first_layer: 0, mesh_hash, told };
+        let opened = Format::Vti.open(opening)?;
         let aovs = Format::Vti.arrays(write);
         let places: Vec<usize> = (0..aovs.iter().map(|aov| aov.count(render.layers)).sum()).collect();
         let open = opened.map(|opened| Open { path: file.to_owned(), file: opened, places });

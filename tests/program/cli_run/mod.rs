@@ -8,6 +8,7 @@ mod interrupt;
 mod limits;
 mod mesh;
 mod pictures;
+mod pieces;
 mod provenance;
 mod shade;
 mod twins;
