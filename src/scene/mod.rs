@@ -40,6 +40,7 @@ mod simplices;
 mod spin;
 mod transform;
 mod twin;
+mod welding;
 
 pub use color::Color;
 pub use cuboid::{BoxSpec, TesseractSpec};

@@ -17,6 +17,7 @@ use super::products::{CubinderSpec, DuocylinderSpec, DuoprismSpec, SpherinderSpe
 use super::simplices::SimplicesSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
+use super::welding::Weld;
 use super::{Error, file};
 use crate::geometry::Dimension;
 use crate::mesh::corners::DEFAULT_ANGLE;
@@ -77,6 +78,11 @@ pub struct ObjectSpec {
     /// Shape: the product of a disc and a rectangle.
     #[serde(default)]
     pub cubinder: Option<CubinderSpec>,
+    /// Of a mesh from a file (`file`, `extrude`, `spin`): points no farther apart than this, in the file's units, are one. So
+    /// close surfaces whose triangles meet but for rounding. If left out, points in one place are one where that matters.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub weld: Option<f64>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -211,13 +217,14 @@ impl Shape<'_> {
     fn build<const D: usize>(
         &self,
         folder: &Path,
+        weld: Weld,
         notes: &mut Vec<String>,
         progress: &dyn Progress,
     ) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
-            Shape::File(path) => Ok(file::build(path, folder, notes)?),
-            Shape::Extrude(spec) => spec.build(folder, progress),
+            Shape::File(path) => file::build(path, folder, weld, notes),
+            Shape::Extrude(spec) => spec.build(folder, weld, notes, progress),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),
             Shape::Tesseract(spec) => spec.build(),
@@ -227,7 +234,7 @@ impl Shape<'_> {
                 spec.build("sphere")
             }
             Shape::Isosurface(spec) => spec.build(folder, notes, progress),
-            Shape::Spin(spec) => spec.build(folder),
+            Shape::Spin(spec) => spec.build(folder, weld, notes),
             Shape::Polytope(spec) => spec.build(),
             Shape::Duoprism(spec) => spec.build(),
             Shape::Duocylinder(spec) => spec.build(),
@@ -323,7 +330,13 @@ pub fn build_object_watched<const D: usize>(
     let shape = spec.shape()?;
     spec.color.rgb()?;
     spec.surface_opacity()?;
-    let mut surface = shape.build::<D>(folder, notes, progress)?;
+    let weld = Weld::new(spec.weld)?;
+    if spec.weld.is_some() && !matches!(shape, Shape::File(_) | Shape::Extrude(_) | Shape::Spin(_)) {
+        let message =
+            format!("a {} has no points to weld; only meshes from files have: file, extrude, spin", shape.key());
+        return Err(Error::invalid("weld", message));
+    }
+    let mut surface = shape.build::<D>(folder, weld, notes, progress)?;
     let solid = shape.solid_simplices(&surface);
     transform::apply("transform", &spec.transform, &mut surface)?;
     check_single_precision(&surface, if spec.transform.is_empty() { shape.key() } else { "transform" })?;
