@@ -82,7 +82,9 @@ def setp(proxy, **properties):
 
 
 def read_vti(panel):
-    reader = XMLImageDataReader(registrationName=panel['file'], FileName=[locate_file(panel['file'])])
+    # A list of parts, or an image.
+    kind = XMLPartitionedImageDataReader if panel['file'].endswith('.pvti') else XMLImageDataReader
+    reader = kind(registrationName=panel['file'], FileName=[locate_file(panel['file'])])
     setp(reader, TimeArray='None')
     return reader
 

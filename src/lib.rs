@@ -17,7 +17,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+// The command line names the library as any program does.
+extern crate self as ao4d;
+
 pub mod accel;
+pub mod cli;
 pub mod geometry;
 pub mod input;
 pub mod inspect;

@@ -1,9 +1,7 @@
 //! The program's door: hand the command line in, hand the exit code out.
 
-mod cli;
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::main()
+    ExitCode::from(ao4d::cli::main(std::env::args_os()))
 }

@@ -17,8 +17,8 @@ use crate::trace::opencl::{self, OpenCl, OpenClBackend};
 use crate::trace::{RayBackend, ShadingPoint};
 use crate::volume::Volume;
 
-/// A scene, and what traces rays in it.
-#[derive(Debug)]
+/// A scene, and what traces rays in it. A copy is cheap: it shares both.
+#[derive(Clone, Debug)]
 pub struct Session<const D: usize> {
     tracer: Arc<Tracer<D>>,
     hash: OnceLock<String>,

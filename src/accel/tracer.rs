@@ -194,8 +194,11 @@ impl<const D: usize> Tracer<D> {
     #[cold]
     pub(super) fn exact_order(&self, ray: &Ray<D>, simplex: u32, cone: &Cone<D>, other: u32) -> Ordering {
         let corners = self.mesh.corners(other);
-        if self.mesh.corners(simplex).iter().all(|corner| corners.contains(corner)) {
-            return Ordering::Equal; // one on the other, as where two boxes touch
+        // Both hold the point where they share what the ray meets of the one: a facet or less of neighbours, or all, as where
+        // two boxes touch.
+        let own = self.mesh.corners(simplex);
+        if (0..D).all(|i| corners.contains(&own[i]) || cone.is_on_facet(i, &ray.direction)) {
+            return Ordering::Equal;
         }
         let other = Cone::of_simplex(&ray.origin, &corners);
         let (a, b) = cone.exact_distance(&ray.direction);

@@ -125,6 +125,13 @@ impl<const D: usize> Cone<D> {
         (0..D).all(|i| self.facet_sign(i, direction, &wide, norm1) * self.orientation >= 0)
     }
 
+    /// Whether the direction lies in the hyperplane of the facet opposite to column `i`.
+    pub fn is_on_facet(&self, i: usize, direction: &Vector<D>) -> bool {
+        let wide = widen(direction);
+        let norm1 = wide.iter().map(|x| x.abs()).sum::<f64>();
+        self.facet_sign(i, direction, &wide, norm1) == 0
+    }
+
     /// Whether the interior of the cone holds the direction; `None` where the direction is in the boundary of the
     /// cone or in the hyperplane of one of its facets, or where the cone is flat.
     pub fn strictly_contains(&self, direction: &Vector<D>) -> Option<bool> {

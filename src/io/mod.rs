@@ -8,6 +8,7 @@
 //! | lists of files over time read | `.pvd`, `.vti.series` | [`series`] |
 //! | images written | `.vti`, `.raw`, `.png` | [`vti`], [`raw`], [`png`] |
 //! | meshes, slices and sequences written | `.vtu`, `.vtp`, `.pvd` | [`vtu`], [`vtp`], [`pvd`] |
+//! | lists of parts written | `.pvti`, `.pvtu` | [`parts`] |
 //! | figures for ParaView written | a script that finds its images beside itself | [`paraview`] |
 //!
 //! Every writer works over any `Write`, so it can be tested in memory; [`AtomicFile`] is the one place that opens
@@ -20,7 +21,9 @@ pub mod image;
 mod inline;
 mod input;
 pub mod mesh;
+pub mod page;
 pub mod paraview;
+pub mod parts;
 pub mod png;
 pub mod pvd;
 pub mod raw;
@@ -29,7 +32,7 @@ pub mod vti;
 pub mod vtk;
 pub mod vtp;
 pub mod vtu;
-mod xml;
+pub(crate) mod xml;
 
 /// The name under which files tell of the pipeline that they were made by.
 pub const PIPELINE: &str = "pipeline";

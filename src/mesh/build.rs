@@ -4,7 +4,9 @@ use rayon::prelude::*;
 
 use super::copies::Sides;
 use super::corners::{self, Corners};
-use super::{Copies, Crease, Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding};
+use super::{
+    Copies, Crease, Gloss, Mesh, MeshError, Object, Orientation, Surface, identity, normals, orientation, rounding,
+};
 use crate::geometry::{Vector, is_degenerate, narrow};
 use crate::progress::{Progress, Silent};
 
@@ -86,6 +88,7 @@ impl<const D: usize> MeshBuilder<D> {
             name: object(),
             color,
             opacity: 1.0,
+            gloss: Gloss::default(),
             vertices: first_vertex..self.mesh.vertices.len(),
             simplices: first_simplex..self.mesh.simplices.len(),
             components: 0,
@@ -100,6 +103,13 @@ impl<const D: usize> MeshBuilder<D> {
     pub fn set_opacity(&mut self, opacity: f32) {
         if let Some(object) = self.mesh.objects.last_mut() {
             object.opacity = opacity;
+        }
+    }
+
+    /// Says how the object that was added last reflects lights.
+    pub fn set_gloss(&mut self, gloss: Gloss) {
+        if let Some(object) = self.mesh.objects.last_mut() {
+            object.gloss = gloss;
         }
     }
 

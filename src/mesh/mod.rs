@@ -54,6 +54,15 @@ pub use orientation::{Orientation, Viewpoint};
 pub use surface::Surface;
 pub use union_find::UnionFind;
 
+/// How an object reflects lights in highlights, as far as it differs from what a picture says of all.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gloss {
+    /// The share of a light that is reflected so, 0 to 1.
+    pub specular: Option<f64>,
+    /// The exponent of the highlights: the higher, the smaller they are.
+    pub shininess: Option<f64>,
+}
+
 /// One object of a scene: which vertices and simplices of the mesh are its own, and how it looks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
@@ -63,6 +72,8 @@ pub struct Object {
     pub color: [f32; 3],
     /// The share of light that each of its surfaces keeps from passing, 0 to 1.
     pub opacity: f32,
+    /// How it reflects lights, where it is not as the picture says.
+    pub gloss: Gloss,
     /// Its vertices.
     pub vertices: Range<usize>,
     /// Its simplices.

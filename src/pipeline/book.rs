@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::cache::{self, Cache, MadeBy};
+use super::pieces;
 use super::report::{FileReport, Report};
 use crate::io;
 use crate::stages::scene::ScenePlan;
-use crate::stages::{Keys, Ledger, Made, Output, Plan, Ref};
+use crate::stages::{Keys, Ledger, Made, Output, Plan, Ref, piece};
 
 /// What is known of a run's files.
 pub(super) struct Book {
@@ -26,9 +27,9 @@ pub(super) struct Book {
 impl Book {
     /// Looks at what earlier runs left. With `force` all has to be made again.
     pub fn open(plan: &Plan, keys: &Keys, made_by: MadeBy, force: bool) -> Self {
-        sweep(plan);
+        let outputs: Vec<_> = (0..plan.stages.len()).map(|stage| plan.left(stage, keys)).collect();
+        sweep(plan, outputs.iter().flatten());
         let cache = Cache::open(&plan.out, force);
-        let outputs: Vec<_> = (0..plan.stages.len()).map(|stage| plan.outputs(stage, keys)).collect();
         let (mut known, mut stale) = (BTreeMap::new(), BTreeSet::new());
         for Output { file, beside, key, .. } in outputs.iter().flatten() {
             let all = || std::iter::once(file).chain(beside);
@@ -109,7 +110,7 @@ impl Book {
 
 impl Ledger for Book {
     fn is_stale(&self, file: &Path) -> bool {
-        self.stale.contains(file)
+        self.stale.contains(file) || self.stale.contains(&piece::stand_in(file))
     }
 
     fn record(&mut self, made: Made) -> Result<(), io::Error> {
@@ -131,10 +132,11 @@ impl Ledger for Book {
 }
 
 /// Takes away what a run left half-written that was killed. The folder is locked, so nobody else is writing these.
-fn sweep(plan: &Plan) {
+fn sweep<'a>(plan: &Plan, outputs: impl Iterator<Item = &'a Output>) {
     let own = (0..plan.stages.len()).flat_map(|stage| plan.all_files_of(stage));
+    let left = outputs.flat_map(|output| std::iter::once(&output.file).chain(&output.beside)).cloned();
     let mut names: BTreeMap<PathBuf, BTreeSet<String>> = BTreeMap::new();
-    for file in own.chain([PathBuf::from(cache::NAME)]) {
+    for file in own.chain(left).chain([PathBuf::from(cache::NAME), PathBuf::from(pieces::NAME)]) {
         let path = plan.out.join(file);
         let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { continue };
         names.entry(folder.to_owned()).or_default().insert(name.to_string_lossy().into_owned());

@@ -4,7 +4,7 @@
 //! written. The system lets go of it however the process ends. The file says who holds it.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, Write};
+use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use crate::io::Unfinished;
@@ -42,19 +42,29 @@ impl Lock {
             folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
         let _ = std::fs::create_dir_all(folder);
         let mut lock = Self { path: folder.join(NAME), file: None, made };
+        let mut tries = 8;
         loop {
             // Opening anything but a file could wait for ever.
             if std::fs::symlink_metadata(&lock.path).is_ok_and(|m| !m.is_file()) {
                 return Ok(lock);
             }
             let opened = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&lock.path);
-            let Ok(mut file) = opened else { return Ok(lock) };
+            let mut file = match opened {
+                Ok(file) => file,
+                // Another run that made the folder too has gone, and the folder with it.
+                Err(error) if error.kind() == ErrorKind::NotFound && tries > 0 => {
+                    tries -= 1;
+                    let _ = std::fs::create_dir_all(folder);
+                    continue;
+                }
+                Err(_) => return Ok(lock),
+            };
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
                     let mut text = String::new();
-                    let _ = (&mut file).take(64).read_to_string(&mut text);
-                    let who = text.trim().parse().map_or_else(|_| String::new(), |id: u32| format!("(process {id}) "));
+                    let _ = (&mut file).take(128).read_to_string(&mut text);
+                    let who = holder(&text);
                     lock.made.clear();
                     return Err(Busy { folder: folder.to_owned(), who });
                 }
@@ -64,13 +74,29 @@ impl Lock {
             // The run before may have taken the file away between the opening and the locking.
             if is_at(&file, &lock.path) {
                 let _ = file.set_len(0).and_then(|()| file.rewind());
-                let _ = writeln!(file, "{}", std::process::id());
+                let _ = writeln!(file, "{} {}", std::process::id(), host());
                 let own = lock.made.iter().chain([&lock.path]).cloned().map(Unfinished::new).collect();
                 lock.file = Some((file, own));
                 return Ok(lock);
             }
         }
     }
+}
+
+/// Who holds a lock, by what is written in its file: a process, and where it runs if that is elsewhere.
+fn holder(text: &str) -> String {
+    let (id, there) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
+    match id.parse::<u32>() {
+        Err(_) => String::new(),
+        Ok(id) if there.is_empty() || there == host() => format!("(process {id}) "),
+        Ok(id) => format!("(process {id} on {there}) "),
+    }
+}
+
+/// This computer's name, where the system tells it.
+fn host() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    name.trim().chars().take(64).filter(|c| !c.is_control()).collect()
 }
 
 #[cfg(unix)]
@@ -117,6 +143,9 @@ mod tests {
         std::fs::write(out.join("file"), "").unwrap();
         drop(lock);
         assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
+        let elsewhere = format!("{}.elsewhere", host());
+        assert_eq!(holder(&format!("12 {elsewhere}\n")), format!("(process 12 on {elsewhere}) "));
+        assert_eq!((holder("12"), holder("")), ("(process 12) ".to_owned(), String::new()));
         // What a killed run leaves is no hindrance.
         std::fs::write(out.join(NAME), "1").unwrap();
         drop(Lock::take(&out).unwrap());

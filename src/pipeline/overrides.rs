@@ -4,13 +4,14 @@
 //! about it quotes it. KEY is a dotted path. Its first word is looked up in this order:
 //!
 //! 1. `name`, `seed` and `stages`, the pipeline's own keys (`stages[1].render.shading` reaches any stage); `folder`,
-//!    `inputs` and `program` too, where no stage is called so;
+//!    `inputs`, `program`, `variables` and `sweep` too, where no stage is called so;
 //! 2. a stage's `id`: `with-ao.dimensions` changes that stage;
 //! 3. a kind of stage: `occlusion.samples` changes every stage of that kind, with an id or without.
 //!
 //! VALUE is YAML, so `render.dimensions=[20, 20, 20]` gives a list. Mappings on the way are made where they are
-//! missing (`render.camera.projection` for a render without `camera`); lists are not made longer. An empty VALUE
-//! takes the key out. Overrides apply in the order given.
+//! missing (`render.camera.projection` for a render without `camera`). An empty VALUE takes the key out, and where KEY
+//! is a stage's id, a kind or `stages[1]` alone, those stages. `stages[+]` puts a stage behind the last one; other lists
+//! are not made longer. Overrides apply in the order given.
 
 use super::suggest;
 use super::yaml::{self, Entry, Node, Origin, Problem, Segment, Value, shorten};
@@ -20,32 +21,49 @@ use crate::stages::KINDS;
 pub(super) const TOP_KEYS: [&str; 3] = ["name", "seed", "stages"];
 
 /// Those of them that files tell, and nobody needs to write.
-const RARE_KEYS: [&str; 3] = ["program", "folder", "inputs"];
+const RARE_KEYS: [&str; 5] = ["program", "folder", "inputs", "variables", "sweep"];
+
+/// Where a stage is added.
+const APPEND: &str = "stages[+]";
 
 /// Applies one assignment to the tree. A refusal without a place is about the assignment itself.
 pub(super) fn apply(root: &mut Node, assignment: &str, origin: Origin) -> Result<(), Problem> {
     let Some((key, text)) = assignment.split_once('=') else {
         return Err(Problem::new("write KEY=VALUE, for instance occlusion.samples=64"));
     };
-    let path = yaml::parse_path(key.trim()).map_err(Problem::new)?;
     let value = if text.trim().is_empty() { None } else { Some(parse_value(text, origin)?) };
+    if key.trim() == APPEND {
+        return append(root, value);
+    }
+    let path = yaml::parse_path(key.trim()).map_err(Problem::new)?;
     let Some((Segment::Key(first), rest)) = path.split_first() else {
         return Err(Problem::new("the key is missing")); // parse_path gives a key first
     };
     // Ids may be called as these are, which are rarely set.
     let taken =
         |root: &Node| root.get("stages").is_some_and(|list| list.items().iter().any(|s| id_of(s) == Some(first)));
+    if let ([Segment::Key(_), Segment::Index(index)], "stages", None) = (&path[..], first.as_str(), &value)
+        && let Some(stages) = root_stages(root)
+        && *index < stages.len()
+    {
+        stages.remove(*index);
+        return Ok(());
+    }
     if TOP_KEYS.contains(&first.as_str()) || (RARE_KEYS.contains(&first.as_str()) && !taken(root)) {
         return assign(root, &path, value.as_ref(), origin);
     }
     let Some(stages) = root_stages(root) else {
         return Err(Problem::new("the pipeline has no list of `stages` to change"));
     };
-    let mut targets: Vec<&mut Node> = Vec::new();
     let by_id = stages.iter().any(|stage| id_of(stage) == Some(first));
+    let wanted = |stage: &Node| if by_id { id_of(stage) == Some(first) } else { kind_of(stage) == Some(first) };
+    if rest.is_empty() && value.is_none() && stages.iter().any(wanted) {
+        stages.retain(|stage| !wanted(stage));
+        return Ok(());
+    }
+    let mut targets: Vec<&mut Node> = Vec::new();
     for stage in stages.iter_mut() {
-        let wanted = if by_id { id_of(stage) == Some(first) } else { kind_of(stage) == Some(first) };
-        if let (true, Value::Map(entries)) = (wanted, &mut stage.value) {
+        if let (true, Value::Map(entries)) = (wanted(stage), &mut stage.value) {
             targets.extend(entries.first_mut().map(|entry| &mut entry.value));
         }
     }
@@ -56,6 +74,18 @@ pub(super) fn apply(root: &mut Node, assignment: &str, origin: Origin) -> Result
         return Err(Problem::new(format!("`{first}` is a stage; name one of its keys: {first}.KEY={}", shorten(text))));
     }
     targets.into_iter().try_for_each(|target| assign(target, rest, value.as_ref(), origin))
+}
+
+/// Puts a stage behind the last one.
+fn append(root: &mut Node, stage: Option<Node>) -> Result<(), Problem> {
+    let Some(stage) = stage else {
+        return Err(Problem::new("write the stage that is to be added, for instance stages[+]={write: {png: a.png}}"));
+    };
+    let Some(stages) = root_stages(root) else {
+        return Err(Problem::new("the pipeline has no list of `stages` to add to"));
+    };
+    stages.push(stage);
+    Ok(())
 }
 
 fn parse_value(text: &str, origin: Origin) -> Result<Node, Problem> {
@@ -176,6 +206,10 @@ stages:
             ("stages[2].render.shading=flat", r#""dimensions":[1,2,3],"shading":"flat""#),
             ("ao.samples=", r#"[{"occlusion":{"id":"ao"}},"#),
             ("ao.file=x=y.f32", r#""file":"x=y.f32""#),
+            ("ao=", r#""stages":[{"occlusion":{"id":"second","samples":4}},{"render":{"dimensions":[1,2,3]}}]"#),
+            ("occlusion=", r#""stages":[{"render":{"dimensions":[1,2,3]}}]"#),
+            ("stages[1]=", r#""stages":[{"occlusion":{"id":"ao","samples":4}},{"render":{"dimensions":[1,2,3]}}]"#),
+            ("stages[+]={write: {png: a.png}}", r#"{"render":{"dimensions":[1,2,3]}},{"write":{"png":"a.png"}}]"#),
         ] {
             let after = after(&[assignment]).unwrap();
             assert!(after.contains(part), "{assignment}: {after}");
@@ -191,6 +225,9 @@ stages:
                 "oclusion.samples=3",
                 "no stage and no key is called `oclusion`, did you mean `occlusion`? (known: ao, second, occlusion, render, name, seed, stages)",
             ),
+            ("paraview=", "the pipeline has no `paraview` stage"),
+            ("stages[+]=", "write the stage that is to be added, for instance stages[+]={write: {png: a.png}}"),
+            ("stages[3]=", "stages: the list has 3 items, so [3] is outside it"),
             ("paraview.state=a.py", "the pipeline has no `paraview` stage"),
             ("ao=3", "`ao` is a stage; name one of its keys: ao.KEY=3"),
             ("render.dimensions[3]=7", "dimensions: the list has 3 items, so [3] is outside it"),

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::stages::Work;
 use crate::stages::describe::size;
 
 /// A finished run.
@@ -21,6 +22,11 @@ pub struct Report {
     pub notes: Vec<String>,
     /// Seconds in all.
     pub seconds: f64,
+    /// What was computed.
+    pub work: Work,
+    /// The piece of the run that this was, K/N, if it wasn't all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub piece: Option<String>,
 }
 
 /// A stage's time.

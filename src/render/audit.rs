@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 
 use super::NOTHING;
 use super::gbuffer::{Columns, GBuffer};
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, Vector};
 use crate::occlusion::{Error, Estimator};
 use crate::progress::{Progress, Uncounted};
 use crate::trace::{RayBackend, Sampling, ShadingPoint};
@@ -34,17 +34,33 @@ pub struct Accuracy {
     pub voxels: usize,
 }
 
-/// Voxels to be looked at again.
-#[derive(Debug)]
-pub(super) struct Audit<const D: usize> {
+/// A voxel that is to be looked at again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Checked<const D: usize> {
+    /// Its number in the image.
+    pub number: u64,
+    /// The simplex that it sees.
+    pub simplex: u32,
+    /// The point that it shows.
+    pub position: Vector<D>,
+    /// The normal there.
+    pub normal: Vector<D>,
+    /// The occlusion that it shows.
+    pub shown: f32,
+}
+
+/// Voxels to be looked at again. Which of a picture that is made in parts, is known when all parts are there: each part
+/// tells its own candidates.
+#[derive(Clone, Debug)]
+pub struct Audit<const D: usize> {
     sampling: Sampling,
-    /// Points and the occlusion that is shown there, by the hash of the voxel's number.
-    chosen: BTreeMap<(u64, usize), (ShadingPoint<D>, f32)>,
+    /// By the hash of the voxel's number.
+    chosen: BTreeMap<(u64, u64), Checked<D>>,
 }
 
 impl<const D: usize> Audit<D> {
     /// What it needs to know of voxels.
-    pub const COLUMNS: Columns =
+    pub(super) const COLUMNS: Columns =
         Columns::SIMPLEX.union(Columns::POSITION).union(Columns::NORMAL).union(Columns::OCCLUSION);
 
     /// Looks again with these rays, which must be others than the picture's own.
@@ -52,25 +68,47 @@ impl<const D: usize> Audit<D> {
         Self { sampling, chosen: BTreeMap::new() }
     }
 
+    /// Voxels whose number has a hash above this are not chosen any more.
+    pub fn limit(&self) -> u64 {
+        match self.chosen.last_key_value() {
+            Some((&(last, _), _)) if self.chosen.len() == VOXELS => last,
+            _ => u64::MAX,
+        }
+    }
+
     /// Chooses among some finished layers.
-    pub fn add(&mut self, buffer: &GBuffer<D>) {
+    pub(super) fn add(&mut self, buffer: &GBuffer<D>) {
         let first = buffer.layers().start * buffer.layer_len();
         for i in (0..buffer.len()).filter(|&i| buffer.simplex[i] != NOTHING) {
-            let key = (hash((first + i) as u64), first + i);
-            if self.chosen.len() == VOXELS && self.chosen.last_key_value().is_some_and(|(last, _)| *last < key) {
-                continue;
-            }
-            let point = ShadingPoint::Inside {
+            self.choose((first + i) as u64, |number| Checked {
+                number,
+                simplex: buffer.simplex[i],
                 position: buffer.position[i],
                 normal: buffer.normal[i],
-                simplex: buffer.simplex[i],
-                number: (first + i) as u64,
-            };
-            self.chosen.insert(key, (point, buffer.occlusion[i]));
-            if self.chosen.len() > VOXELS {
-                self.chosen.pop_last();
-            }
+                shown: buffer.occlusion[i],
+            });
         }
+    }
+
+    /// Takes a candidate of a part.
+    pub fn insert(&mut self, candidate: Checked<D>) {
+        self.choose(candidate.number, |_| candidate);
+    }
+
+    fn choose(&mut self, number: u64, candidate: impl FnOnce(u64) -> Checked<D>) {
+        let key = (hash(number), number);
+        if self.chosen.len() == VOXELS && self.chosen.last_key_value().is_some_and(|(last, _)| *last < key) {
+            return;
+        }
+        self.chosen.insert(key, candidate(number));
+        if self.chosen.len() > VOXELS {
+            self.chosen.pop_last();
+        }
+    }
+
+    /// What was chosen so far.
+    pub fn candidates(&self) -> impl Iterator<Item = &Checked<D>> {
+        self.chosen.values()
     }
 
     /// Looks at what was chosen; none if no voxel sees anything.
@@ -78,7 +116,11 @@ impl<const D: usize> Audit<D> {
     /// # Errors
     /// If `progress` says so, or a device fails.
     pub fn finish(self, backend: &dyn RayBackend<D>, progress: &dyn Progress) -> Result<Option<Accuracy>, Error> {
-        let (points, shown): (Vec<_>, Vec<f32>) = self.chosen.into_values().unzip();
+        let point = |checked: Checked<D>| {
+            let Checked { number, simplex, position, normal, shown } = checked;
+            (ShadingPoint::Inside { position, normal, simplex, number }, shown)
+        };
+        let (points, shown): (Vec<_>, Vec<f32>) = self.chosen.into_values().map(point).unzip();
         let found = Estimator::Sampled(self.sampling).estimate(backend, &points, None, &Uncounted(progress))?;
         let (mut sum, mut largest) = (0.0, 0.0f64);
         for (&truth, &shown) in found.values.iter().zip(&shown) {
@@ -96,7 +138,7 @@ impl<const D: usize> Audit<D> {
 }
 
 /// Spreads numbers evenly (the finaliser of SplitMix64; Steele, Lea and Flood 2014).
-fn hash(number: u64) -> u64 {
+pub(super) fn hash(number: u64) -> u64 {
     let mut x = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -27,6 +27,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::tone::to_linear;
 use crate::accel::Tracer;
 use crate::geometry::{Ray, Vector, Vector64, narrow, normal_of, widen};
+use crate::mesh::Gloss;
 
 /// How far from a simplex's hyperplane a point may be that lies in it, as a share of its distance from the origin: some
 /// roundings to `f32` of the point and of the corners.
@@ -37,7 +38,7 @@ const ROUNDING: f64 = 8.0 * (f32::EPSILON as f64);
 pub struct Lighting<const D: usize> {
     /// The ambient light where all is open.
     pub ambient: f64,
-    /// The share of a light that is reflected as by a mirror, in highlights.
+    /// The share of a light that is reflected as by a mirror, in highlights, by objects that don't say their own.
     pub specular: f64,
     /// The exponent of the highlights: the higher the smaller they are.
     pub shininess: f64,
@@ -91,6 +92,8 @@ pub(super) struct Lit<const D: usize> {
     pub to_eye: Vector64<D>,
     /// What it reflects, linear.
     pub reflectance: [f64; 3],
+    /// Its highlights, where they are not those of the picture.
+    pub gloss: Gloss,
 }
 
 impl<const D: usize> Lighting<D> {
@@ -113,6 +116,8 @@ impl<const D: usize> Lighting<D> {
     /// What a point sends to the eye of the lights' light, linear, before depth cues.
     pub(super) fn direct(&self, tracer: &Tracer<D>, lit: &Lit<D>) -> [f64; 3] {
         let mut sum = [0.0; 3];
+        let specular = lit.gloss.specular.unwrap_or(self.specular);
+        let shininess = lit.gloss.shininess.unwrap_or(self.shininess);
         for (light, reached) in self.lights.iter().zip(&self.reached) {
             let point = narrow(&lit.point);
             let Some((towards, distance)) = light.source.from(&widen(&point)) else { continue };
@@ -130,8 +135,8 @@ impl<const D: usize> Lighting<D> {
                 Source::Point(_) => distance.powi(1 - D as i32),
             };
             let halfway = towards + lit.to_eye;
-            let highlight = if self.specular > 0.0 && halfway.norm() > 0.0 {
-                self.specular * libm::pow(lit.normal.dot(&halfway.normalize()).clamp(0.0, 1.0), self.shininess)
+            let highlight = if specular > 0.0 && halfway.norm() > 0.0 {
+                specular * libm::pow(lit.normal.dot(&halfway.normalize()).clamp(0.0, 1.0), shininess)
             } else {
                 0.0
             };
@@ -152,8 +157,8 @@ impl<const D: usize> Lighting<D> {
     }
 }
 
-/// The reflectance of a surface of this colour.
-pub(super) fn reflectance(color: [f32; 3]) -> [f64; 3] {
+/// The reflectance of a surface of this colour, linear, from the colour as a screen shows it.
+pub fn reflectance(color: [f32; 3]) -> [f64; 3] {
     color.map(|c| to_linear(f64::from(c)))
 }
 

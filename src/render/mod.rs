@@ -32,14 +32,14 @@ pub mod tone;
 pub mod visibility;
 
 pub use aov::Aov;
-pub use audit::Accuracy;
+pub use audit::{Accuracy, Audit, Checked};
 pub use camera::{Camera, CameraError, Projection, View};
 pub use gbuffer::{Columns, GBuffer};
 pub use layers::{LayerPoint, Layers, MOST as MOST_LAYERS};
-pub use light::{DepthCue, Light, Lighting, Source};
-pub use renderer::{Renderer, Slab};
+pub use light::{DepthCue, Light, Lighting, Source, reflectance};
+pub use renderer::{Rendered, Renderer, Slab};
 pub use samples::MOST as MOST_SAMPLES;
-pub use screen_space::{DepthImage, ScreenSpace, Thickness};
+pub use screen_space::{DepthImage, ScreenSpace, Seen, Thickness};
 pub use shading::Shading;
 pub use skylight::{Skylight, radiosity, relight};
 pub use visibility::{NOTHING, Passages, Visibility};

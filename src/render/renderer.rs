@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::audit::Audit;
 use super::filters::{self, Chain, ImageFilter};
@@ -15,6 +16,7 @@ use super::{
     screen_space, visibility,
 };
 use crate::accel::Tracer;
+use crate::geometry::Vector64;
 use crate::occlusion::Error;
 use crate::progress::{Progress, Uncounted};
 use crate::trace::cpu::CpuBackend;
@@ -65,6 +67,15 @@ pub struct Slab {
     pub behind: u64,
 }
 
+/// What is known of a picture, or of some of its layers, when they are made.
+#[derive(Debug)]
+pub struct Rendered<const D: usize> {
+    /// The voxels at which it is to be looked at again, if that was asked for.
+    pub audit: Option<Audit<D>>,
+    /// Voxels whose shade was found, with those beyond the layers that were asked for, which filters look at.
+    pub voxels: u64,
+}
+
 impl<const D: usize> Renderer<D> {
     /// A picture with one sample a voxel and no filter.
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Self {
@@ -102,17 +113,38 @@ impl<const D: usize> Renderer<D> {
         aovs: &[Aov],
         thickness: Option<usize>,
         progress: &dyn Progress,
-        mut sink: impl FnMut(Slab) -> Result<(), E>,
+        sink: impl FnMut(Slab) -> Result<(), E>,
     ) -> Result<Option<Accuracy>, E> {
-        let depth = self.grid.dimensions[2];
+        let made = self.render_layers(0..self.grid.dimensions[2], None, aovs, thickness, progress, sink)?;
+        Ok(made.audit.map(|audit| audit.finish(&*self.backend, progress)).transpose()?.flatten())
+    }
+
+    /// The same for some layers of the picture. No slab reaches from before the layer `border` to behind it; audited is
+    /// what lies before it.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn render_layers<E: From<Error>>(
+        &self,
+        wanted: Range<usize>,
+        border: Option<usize>,
+        aovs: &[Aov],
+        thickness: Option<usize>,
+        progress: &dyn Progress,
+        mut sink: impl FnMut(Slab) -> Result<(), E>,
+    ) -> Result<Rendered<D>, E> {
+        let border = border.unwrap_or(wanted.end).clamp(wanted.start, wanted.end);
         let thickness = thickness.unwrap_or_else(|| self.layers_within(SLAB_BYTES, aovs)).max(1);
         let sampling = Sampling::new(&self.camera, &self.grid, self.supersample);
         let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
         let columns = self.columns(aovs);
         let depth_image = match self.shading {
-            Shading::ScreenSpace(settings) => Some(self.depth_image(settings, progress)?),
+            Shading::ScreenSpace(settings) => Some(self.depth_image(settings, columns, progress)?),
             _ => None,
         };
+        // Where only the audit asks for points, it does so of few voxels.
+        let limit = AtomicU64::new(u64::MAX);
+        let points = Columns::POSITION | Columns::NORMAL | Columns::SHADING_NORMAL | Columns::BARYCENTRIC;
         let pass = SurfacePass {
             tracer: self.tracer(),
             camera: &self.camera,
@@ -121,6 +153,7 @@ impl<const D: usize> Renderer<D> {
             shading: &self.shading,
             lighting: self.lighting.as_ref(),
             skylight: self.skylight.as_deref(),
+            points: (!self.columns_shown(aovs).intersects(points)).then_some(&limit),
         };
         if columns.contains(Columns::DIRECT) {
             self.tracer().prepare();
@@ -139,7 +172,9 @@ impl<const D: usize> Renderer<D> {
             most: self.layers,
             occluded: aovs.contains(&Aov::LayerAmbientOcclusion),
         });
+        let mut voxels = 0;
         let mut source = |layers: Range<usize>| -> Result<GBuffer<D>, Error> {
+            voxels += (layers.len() * self.grid.layer_len()) as u64;
             let mut buffer = pass.layers(layers, columns, progress)?;
             if columns.intersects(behind::COLUMNS) {
                 behind::add(&pass, &*self.backend, &mut buffer, progress)?;
@@ -161,23 +196,27 @@ impl<const D: usize> Renderer<D> {
             Ok(buffer)
         };
         let mut audit = self.audit.map(Audit::new);
-        let mut chain = Chain::new(self.grid.dimensions, columns, &self.filters);
-        for first in (0..depth).step_by(thickness) {
-            let mut buffer = chain.next(depth.min(first + thickness), &mut source, progress)?;
+        let mut chain = Chain::new(self.grid.dimensions, wanted.start, columns, &self.filters);
+        let mut first = wanted.start;
+        while first < wanted.end {
+            let end = if first < border { border } else { wanted.end };
+            let mut buffer = chain.next(end.min(first + thickness), &mut source, progress)?;
+            first = buffer.layers().end;
             shine(self.skylight.as_deref(), &mut buffer);
             let layers = layered.as_ref().map(|pass| pass.layers(buffer.layers(), progress)).transpose()?;
             let layers = layers.unwrap_or_default();
             buffer.passages.iter_mut().enumerate().for_each(|(i, count)| *count = layers.count(i));
             let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
-            if let Some(audit) = &mut audit {
+            if let Some(audit) = audit.as_mut().filter(|_| first <= border) {
                 audit.add(&buffer);
+                limit.store(audit.limit(), Ordering::Relaxed);
             }
             let arrays = aovs.iter().flat_map(|aov| aov.arrays(&buffer, &layers)).collect();
             let is_behind = |simplex: u32| simplex != NOTHING && visibility.is_away(simplex);
             let behind = buffer.simplex.iter().filter(|&&simplex| is_behind(simplex)).count() as u64;
             sink(Slab { layers: buffer.layers(), arrays, seen, behind })?;
         }
-        Ok(audit.map(|audit| audit.finish(&*self.backend, progress)).transpose()?.flatten())
+        Ok(Rendered { audit, voxels })
     }
 
     /// The whole picture in memory.
@@ -193,8 +232,44 @@ impl<const D: usize> Renderer<D> {
         Ok(Volume { grid: self.grid, arrays, field_data: Vec::new() })
     }
 
-    /// What the voxels' centres see, as far as screen space looks at it; made slab by slab too.
-    fn depth_image(&self, settings: ScreenSpace, progress: &dyn Progress) -> Result<DepthImage<D>, Error> {
+    /// What the voxels' centres see, as far as screen space looks at it for these columns; made slab by slab too.
+    fn depth_image(
+        &self,
+        settings: ScreenSpace,
+        columns: Columns,
+        progress: &dyn Progress,
+    ) -> Result<DepthImage<D>, Error> {
+        let mut distances = Vec::with_capacity(self.grid.len());
+        self.centres(Columns::SIMPLEX | Columns::DEPTH, progress, |slab| {
+            distances.extend(slab.depth);
+            Ok(())
+        })?;
+        let mut image = DepthImage::new(&self.camera, &self.grid, distances, settings);
+        let is_lit = columns.contains(Columns::HIDDEN);
+        if is_lit || columns.contains(Columns::DIRECTION) {
+            image = image.directed();
+        }
+        if !is_lit {
+            return Ok(image);
+        }
+        // Light goes from what is seen to what is seen, so where it comes from is found for all voxels first.
+        let gradient = self.skylight.as_deref().map_or_else(Vector64::zeros, |skylight| skylight.gradient);
+        let mut light = Vec::with_capacity(self.grid.len());
+        self.centres(screen_space::COLUMNS | Columns::DIRECTION, progress, |mut slab| {
+            screen_space::occlude(&image, &mut slab, progress)?;
+            light.extend(screen_space::radiosity(self.tracer().mesh(), &slab, &gradient));
+            Ok(())
+        })?;
+        Ok(image.lit(light))
+    }
+
+    /// What the voxels' centres see, without occlusion, slab by slab.
+    fn centres(
+        &self,
+        columns: Columns,
+        progress: &dyn Progress,
+        mut sink: impl FnMut(GBuffer<D>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let sampling = Sampling::new(&self.camera, &self.grid, 1);
         let visibility = Visibility::new(Arc::clone(&self.backend), &self.camera, &sampling.fine, self.visibility);
         let pass = SurfacePass {
@@ -205,24 +280,25 @@ impl<const D: usize> Renderer<D> {
             shading: &Shading::None,
             lighting: None,
             skylight: None,
+            points: None,
         };
-        let columns = Columns::SIMPLEX | Columns::DEPTH;
         let [_, _, layers] = self.grid.dimensions;
         let voxel = columns.bytes::<D>() + size_of::<u32>();
         let thickness = (SLAB_BYTES / voxel / self.grid.layer_len().max(1)).clamp(1, layers);
-        let mut distances = Vec::with_capacity(self.grid.len());
         for first in (0..layers).step_by(thickness) {
-            let slab = pass.layers(first..layers.min(first + thickness), columns, &Uncounted(progress))?;
-            distances.extend(slab.depth);
+            sink(pass.layers(first..layers.min(first + thickness), columns, &Uncounted(progress))?)?;
         }
-        Ok(DepthImage::new(&self.camera, &self.grid, distances, settings))
+        Ok(())
+    }
+
+    /// The columns that the picture needs.
+    fn columns(&self, aovs: &[Aov]) -> Columns {
+        self.columns_shown(aovs) | self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS)
     }
 
     /// The columns that arrays and filters need.
-    fn columns(&self, aovs: &[Aov]) -> Columns {
-        let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
+    fn columns_shown(&self, aovs: &[Aov]) -> Columns {
         let mut columns = columns(&self.shading, aovs)
-            | audited
             | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns());
         if self.lighting.is_some() && columns.contains(Columns::ALBEDO) {
             columns |= Columns::DIRECT;

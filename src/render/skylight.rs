@@ -36,6 +36,8 @@ pub struct Skylight<const D: usize> {
     pub bounced: Option<Arc<Bounced>>,
     /// The light that leaves the surface at each vertex ([`radiosity`]), for points that look for themselves.
     pub radiosity: Option<Arc<Vec<[f32; 3]>>>,
+    /// Whether all of it is looked for in the image itself, in screen space, and if so, whether the light of other surfaces is too.
+    pub in_image: Option<bool>,
     /// Rays of such points that hit something, and those that hit it from behind.
     hits: AtomicU64,
     behind: AtomicU64,
@@ -45,7 +47,7 @@ impl<const D: usize> Skylight<D> {
     /// A sky of this gradient over scenes without occlusion.
     pub fn new(gradient: Vector64<D>) -> Self {
         let (hits, behind) = (AtomicU64::new(0), AtomicU64::new(0));
-        Self { gradient, directions: None, bounced: None, radiosity: None, hits, behind }
+        Self { gradient, directions: None, bounced: None, radiosity: None, in_image: None, hits, behind }
     }
 
     /// Whether it shines on all sides alike.
@@ -69,7 +71,7 @@ impl<const D: usize> Skylight<D> {
     pub(super) fn columns(&self) -> Columns {
         let direction = if self.is_even() { Columns::empty() } else { Columns::DIRECTION };
         let hidden = match (&self.bounced, &self.radiosity) {
-            (None, None) => Columns::empty(),
+            (None, None) if self.in_image != Some(true) => Columns::empty(),
             _ => Columns::HIDDEN,
         };
         direction | hidden

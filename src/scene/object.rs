@@ -18,11 +18,12 @@ use super::simplices::SimplicesSpec;
 use super::slab::SlabSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
+use super::welding::Weld;
 use super::{Error, file};
 use crate::geometry::Dimension;
 use crate::mesh::corners::DEFAULT_ANGLE;
 use crate::mesh::rounding::turned_over;
-use crate::mesh::{Crease, Surface};
+use crate::mesh::{Crease, Gloss, Surface};
 use crate::progress::{Progress, Silent};
 
 /// An object: exactly one shape, and where to put it. The shapes' keys are those that [`ObjectSpec::shape`] lists.
@@ -81,6 +82,11 @@ pub struct ObjectSpec {
     /// What of it is kept: the part between two parallel hyperplanes, before it is placed. What was closed is closed again.
     #[serde(default)]
     pub slab: Option<SlabSpec>,
+    /// Of a mesh from a file (`file`, `extrude`, `spin`): points no farther apart than this, in the file's units, are one. So
+    /// close surfaces whose triangles meet but for rounding. If left out, points in one place are one where that matters.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub weld: Option<f64>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -92,6 +98,14 @@ pub struct ObjectSpec {
     #[serde(default)]
     #[schemars(range(min = 0, max = 1))]
     pub opacity: Option<f64>,
+    /// The share of lights that the object reflects in highlights, 0 to 1 (default what the render says).
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1))]
+    pub specular: Option<f64>,
+    /// The exponent of its highlights: the higher, the smaller they are (default what the render says).
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub shininess: Option<f64>,
     /// Which way the surface faces: `input` (default), open surfaces by the order of their vertices, closed ones outwards; or
     /// `eye`, where it is seen from by the first render of the scene, so that a closed surface around the eye is a room.
     #[serde(default)]
@@ -215,13 +229,14 @@ impl Shape<'_> {
     fn build<const D: usize>(
         &self,
         folder: &Path,
+        weld: Weld,
         notes: &mut Vec<String>,
         progress: &dyn Progress,
     ) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
-            Shape::File(path) => Ok(file::build(path, folder, notes)?),
-            Shape::Extrude(spec) => spec.build(folder, progress),
+            Shape::File(path) => file::build(path, folder, weld, notes),
+            Shape::Extrude(spec) => spec.build(folder, weld, notes, progress),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),
             Shape::Tesseract(spec) => spec.build(),
@@ -231,7 +246,7 @@ impl Shape<'_> {
                 spec.build("sphere")
             }
             Shape::Isosurface(spec) => spec.build(folder, notes, progress),
-            Shape::Spin(spec) => spec.build(folder),
+            Shape::Spin(spec) => spec.build(folder, weld, notes),
             Shape::Polytope(spec) => spec.build(),
             Shape::Duoprism(spec) => spec.build(),
             Shape::Duocylinder(spec) => spec.build(),
@@ -287,6 +302,18 @@ impl ObjectSpec {
         }
     }
 
+    /// How it reflects lights, where that is not left to the picture.
+    pub fn gloss(&self) -> Result<Gloss, Error> {
+        let within = |key: &str, found: Option<f64>, least: f64, most: f64| match found {
+            Some(x) if !(least..=most).contains(&x) => {
+                Err(Error::invalid(key, format!("expected a number from {least} to {most}, found {x}")))
+            }
+            found => Ok(found),
+        };
+        let specular = within("specular", self.specular, 0.0, 1.0)?;
+        Ok(Gloss { specular, shininess: within("shininess", self.shininess, 1.0, 1e6)? })
+    }
+
     /// Where the object's vertices are split.
     pub fn crease(&self) -> Result<Crease, Error> {
         Ok(match (self.crease_angle, self.shape()?) {
@@ -327,7 +354,14 @@ pub fn build_object_watched<const D: usize>(
     let shape = spec.shape()?;
     spec.color.rgb()?;
     spec.surface_opacity()?;
-    let mut surface = shape.build::<D>(folder, notes, progress)?;
+    spec.gloss()?;
+    let weld = Weld::new(spec.weld)?;
+    if spec.weld.is_some() && !matches!(shape, Shape::File(_) | Shape::Extrude(_) | Shape::Spin(_)) {
+        let message =
+            format!("a {} has no points to weld; only meshes from files have: file, extrude, spin", shape.key());
+        return Err(Error::invalid("weld", message));
+    }
+    let mut surface = shape.build::<D>(folder, weld, notes, progress)?;
     if let Some(slab) = &spec.slab {
         surface = slab.cut(surface, progress)?;
     }

@@ -244,7 +244,7 @@ pub fn without(mut fields: Value, left_out: &[LeftOut]) -> Value {
 }
 
 /// The program: its version, and which build of it this is, so that a new build trusts nothing an older one made.
-fn program() -> String {
+pub fn program() -> String {
     let build = std::env::current_exe().and_then(std::fs::metadata).and_then(|m| Ok((m.len(), m.modified()?)));
     format!("{} {build:?}", env!("CARGO_PKG_VERSION"))
 }

@@ -72,6 +72,8 @@ pub(super) struct LightingKeys<'s> {
     pub specular: Option<f64>,
     pub shininess: Option<f64>,
     pub depth_cue: Option<&'s DepthCueSpec>,
+    /// Whether objects of the scene have highlights of their own.
+    pub is_glossy: bool,
 }
 
 /// What light from the sky and from other surfaces a picture needs.
@@ -161,17 +163,11 @@ pub(super) fn plan(
     let ambient = if lights.is_empty() { without } else { beside_lights };
     let ambient = within(&format!("{path}.ambient"), keys.ambient, ambient, 0.0, 1e6)?;
     let sky = keys.sky.map(|sky| gradient(sky, &format!("{path}.sky.gradient"), dimension)).transpose()?;
-    let bounce = match keys.bounce {
-        None | Some(0) => false,
-        Some(1) => true,
-        Some(n) => {
-            let message = format!("expected 0 or 1, found {n}: light is followed over one reflection, not over more");
-            return Err(Invalid::new(format!("{path}.bounce"), message));
-        }
-    };
+    let bounce = bounce(keys.bounce, path)?;
     let specular = within(&format!("{path}.specular"), keys.specular, 0.0, 0.0, 1.0)?;
     let shininess = within(&format!("{path}.shininess"), keys.shininess, SHININESS, 1.0, 1e6)?;
     let depth_cue = keys.depth_cue.map(|cue| depth_cue(cue, &format!("{path}.depth_cue"))).transpose()?;
+    let is_glossy = specular > 0.0 || keys.is_glossy;
     let mut unused = |key: &str, message: &str| warnings.push(Invalid::new(format!("{path}.{key}"), message));
     if keys.lights.is_some() && lights.is_empty() {
         unused("lights", "has no light; without any, leave the key out");
@@ -179,15 +175,27 @@ pub(super) fn plan(
     if keys.specular.is_some() && lights.is_empty() {
         unused("specular", "has no effect without `lights`: ambient light makes no highlights");
     }
-    if keys.shininess.is_some() && (lights.is_empty() || specular == 0.0) {
+    if keys.shininess.is_some() && (lights.is_empty() || !is_glossy) {
         unused("shininess", "has no effect without `lights` and `specular`");
     }
     let is_lit = !lights.is_empty() || keys.ambient.is_some() || depth_cue.is_some() || sky.is_some() || bounce;
     Ok(is_lit.then_some(LightingPlan { lights, ambient, sky, bounce, specular, shininess, depth_cue }))
 }
 
+/// Whether the light of other surfaces is followed.
+pub(super) fn bounce(given: Option<u64>, path: &str) -> Result<bool, Invalid> {
+    match given {
+        None | Some(0) => Ok(false),
+        Some(1) => Ok(true),
+        Some(n) => {
+            let message = format!("expected 0 or 1, found {n}: light is followed over one reflection, not over more");
+            Err(Invalid::new(format!("{path}.bounce"), message))
+        }
+    }
+}
+
 /// A sky's gradient, checked.
-fn gradient(spec: &SkySpec, path: &str, dimension: Dimension) -> Result<Vec<f64>, Invalid> {
+pub(super) fn gradient(spec: &SkySpec, path: &str, dimension: Dimension) -> Result<Vec<f64>, Invalid> {
     let gradient = check_vector(path, &spec.gradient, dimension.get())?;
     let length = gradient.iter().map(|x| x * x).sum::<f64>().sqrt();
     // As near as rounding of what is written.
@@ -301,7 +309,8 @@ impl LightingPlan {
         if !self.lights.is_empty() {
             written.insert("lights".to_owned(), self.lights.iter().map(light).collect());
             written.insert("specular".to_owned(), self.specular.into());
-            if self.specular > 0.0 {
+            // Objects may have highlights that follow it.
+            if self.specular > 0.0 || self.shininess != SHININESS {
                 written.insert("shininess".to_owned(), self.shininess.into());
             }
         }
@@ -339,7 +348,7 @@ pub(super) struct LightFound {
 impl LightFound {
     pub fn new<const D: usize>(light: &Skylight<D>, session: &Session<D>) -> Self {
         let (hits, behind) = light.seen();
-        Self { hits, behind, beside_opencl: session.is_on_opencl() }
+        Self { hits, behind, beside_opencl: session.is_on_opencl() && light.in_image.is_none() }
     }
 
     /// What to tell of it; `rays` says how many meet surfaces from behind.

@@ -12,9 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use super::describe::{Counts, grouped};
 use super::occlusion::{self, OcclusionPlan};
+use super::piece::{self, Piece};
 use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
-use super::write::{Found, vtu};
+use super::write::{Found, MeshPart, vtu};
 use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::io;
 
@@ -84,6 +85,12 @@ impl Stage for MeshPlan {
         vec![Output::alone(&plan[me].file, keys.of(me.index()).to_owned())]
     }
 
+    fn parts(me: Ref<Self>, plan: &Plan, keys: &Keys, piece: Piece) -> Vec<Output> {
+        let list = (piece.index() == 0).then(|| piece::list_of(&plan[me].file));
+        let part = |output: Output| Output { beside: list.clone().into_iter().collect(), ..output };
+        Self::outputs(me, plan, keys).into_iter().map(part).collect()
+    }
+
     fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
         vtu::retell(&plan.out.join(output), text)
     }
@@ -107,6 +114,9 @@ impl Stage for MeshPlan {
         let mesh = scene.session.mesh();
         let points: Vec<[f32; 3]> = mesh.vertices.iter().map(vtu::first_three).collect();
         let values = occlusion.map(|occlusion| &*scene.values[&occlusion]);
+        let list = piece::list_of(file);
+        let part = plan.piece.map(|piece| MeshPart::of(piece, mesh.vertices.len(), file, &list));
+        let is_list = part.as_ref().is_some_and(|part| part.list.is_some());
         let bytes = vtu::write(
             &plan.out.join(file),
             run.told,
@@ -114,7 +124,11 @@ impl Stage for MeshPlan {
             &points,
             &mesh.simplices,
             Found { values, vectors: None },
+            part,
         )?;
+        if is_list {
+            run.made_beside(&list, 0)?;
+        }
         run.made(file, bytes, Vec::new())?;
         Ok(String::new())
     }

@@ -1,5 +1,5 @@
 //! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`, `mesh`, `slice`,
-//! `wireframe`, `animate`, `shade`.
+//! `wireframe`, `animate`, `shade`, `page`.
 //!
 //! A stage's file holds all there is to know of it: what is written in YAML (its `Spec`), what is understood of that
 //! (its `Plan`: checked, resolved, every default filled in), its part of the key that tells whether a file is fresh, its
@@ -19,6 +19,7 @@
 //! - a `wireframe` works on the scene of a render, and looks through its camera;
 //! - an `animate` works on a render, whose picture it makes again and again while something moves;
 //! - a `shade` works on an image in a file;
+//! - a `page` works on writes and animations, all earlier ones if it doesn't say which;
 //! - a `paraview` figure works on writes, which it finds also by the name of their render, and on animations.
 
 pub mod animate;
@@ -26,14 +27,18 @@ pub mod camera;
 pub mod cut;
 pub mod describe;
 mod error;
+pub(crate) mod fit;
 pub mod key;
 pub mod lighting;
+pub mod memory;
 pub mod mesh;
 mod names;
 pub mod occlusion;
 mod one_or_many;
+pub mod page;
 pub mod paraview;
 mod picture;
+pub mod piece;
 mod plan;
 pub mod prepare;
 pub mod projection;
@@ -65,9 +70,10 @@ pub use describe::{Counts, Totals};
 pub use error::{Invalid, StageError};
 pub use key::{Keys, LeftOut, Output};
 pub use one_or_many::OneOrMany;
+pub use piece::Piece;
 pub use plan::{Plan, Planned, Ref};
 pub use resolve::Resolver;
-pub use run::{Ledger, Made, Run, SceneRun};
+pub use run::{Ledger, Made, Run, SceneRun, Work};
 
 /// Coordinates and lengths beyond this are refused: their squares must stay far inside `f32`.
 pub const MAX_LENGTH: f64 = 1e12;
@@ -141,6 +147,18 @@ pub trait Stage: plan::OfKind + Serialize {
     /// The files that it leaves and the cache knows, each with its key.
     fn outputs(_me: Ref<Self>, _plan: &Plan, _keys: &Keys) -> Vec<Output> {
         Vec::new()
+    }
+
+    /// The files that a piece of a run leaves in the place of those, each with its key. What isn't among them is made when
+    /// all pieces are joined.
+    fn parts(_me: Ref<Self>, _plan: &Plan, _keys: &Keys, _piece: Piece) -> Vec<Output> {
+        Vec::new()
+    }
+
+    /// Pictures of its own that show values at vertices, of those that a piece of a run makes: in a piece their vertices are
+    /// wanted, not all.
+    fn pictures(_me: Ref<Self>, _plan: &Plan, _piece: Piece) -> Option<Vec<(PathBuf, render::RenderPlan)>> {
+        None
     }
 
     /// Puts another text in the place of the one that a file of its outputs tells of the pipeline; the rest of the file
@@ -295,6 +313,14 @@ macro_rules! stages {
                 match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::outputs(self.at(index), self, keys)),+ }
             }
 
+            fn parts(&self, index: usize, keys: &Keys, piece: Piece) -> Vec<Output> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::parts(self.at(index), self, keys, piece)),+ }
+            }
+
+            fn pictures(&self, index: usize, piece: Piece) -> Option<Vec<(PathBuf, render::RenderPlan)>> {
+                match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::pictures(self.at(index), self, piece)),+ }
+            }
+
             pub fn retell(&self, index: usize, output: &Path, text: &str) -> Result<u64, io::Error> {
                 match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::retell(self.at(index), self, output, text)),+ }
             }
@@ -368,4 +394,6 @@ stages! {
     Animate: animate::AnimateSpec => animate::AnimatePlan;
     /// Ambient occlusion for an image that is there already.
     Shade: shade::ShadeSpec => shade::ShadePlan;
+    /// One HTML file that shows images in a browser.
+    Page: page::PageSpec => page::PagePlan;
 }

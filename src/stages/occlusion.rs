@@ -15,6 +15,7 @@ use serde_json::{Map, Value, json};
 use super::describe::{Counts, Totals, grouped};
 use super::key::without;
 use super::picture::mark_seen;
+use super::piece::{self, Piece, Values};
 use super::prepare::{Loaded, errors_path, kept, sidecar_path};
 use super::range::positive;
 use super::render::{self, RenderPlan};
@@ -232,6 +233,13 @@ impl Stage for OcclusionPlan {
         vec![Output { file: file.clone(), beside, key, tells }]
     }
 
+    /// The values of a share of the vertices, if some file wants all of them.
+    fn parts(me: Ref<Self>, plan: &Plan, keys: &Keys, _: Piece) -> Vec<Output> {
+        let key = keys.hash(&(keys.of(me.index()), wants_directions(me, plan)));
+        let part = || Output { file: piece::values_of(me.nth()), beside: Vec::new(), key, tells: None };
+        wants_all(me, plan).then(part).into_iter().collect()
+    }
+
     fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
         let path = plan.out.join(sidecar_path(output));
         let failed = |cause| io::Error::File { path: path.clone(), action: "be read", cause };
@@ -281,6 +289,12 @@ impl Stage for OcclusionPlan {
 
     fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
         let plan = run.plan;
+        if plan.piece.is_some() {
+            if run.is_stale(&piece::values_of(me.nth())) {
+                values(me, run, scene)?;
+            }
+            return Ok(String::new());
+        }
         let Some(file) = plan[me].file.as_deref() else { return Ok(String::new()) };
         if !run.is_stale(file) {
             return Ok("as it was".to_owned());
@@ -324,6 +338,11 @@ fn remove(run: &mut Run, file: &Path) -> Result<(), StageError> {
 }
 
 impl OcclusionPlan {
+    /// Whether its values are read from a file.
+    pub fn is_loaded(&self) -> bool {
+        matches!(self.source, OcclusionSource::Load(_))
+    }
+
     /// Where the standard errors of the values are kept: in `NAME.error.f32` beside `NAME.f32`. None if there is no file,
     /// or no error.
     fn errors_file(&self) -> Option<PathBuf> {
@@ -367,6 +386,12 @@ pub fn values<const D: usize>(
             let (values, errors) = run.loaded.get_mut(&me).map(take).unwrap_or_default();
             Estimates { values, errors, rays: 0 }
         }
+        OcclusionSource::Compute(computation) if plan.piece.is_some() => {
+            let start = Instant::now();
+            let found = in_piece(me, computation, run, scene)?;
+            run.early.entry(me.index()).or_default().1 = rate(&found, start);
+            found
+        }
         OcclusionSource::Compute(computation) => {
             // A file that is still fresh holds the values already.
             let file = plan[me].file.as_deref().filter(|file| !run.is_stale(file));
@@ -374,6 +399,11 @@ pub fn values<const D: usize>(
                 kept(&plan.out.join(file), scene.session.mesh_hash(), scene.session.mesh().vertices.len())
             }) {
                 Some(found) => found,
+                None if run.joined.is_some() => {
+                    let joined = run.joined.as_ref().map(|j| j.values(me.nth(), scene.session.mesh().vertices.len()));
+                    let Values { values, errors, rays, .. } = joined.transpose()?.unwrap_or_default();
+                    Estimates { values, errors, rays }
+                }
                 None => {
                     let start = Instant::now();
                     let found = compute(me, computation, run, scene)?;
@@ -395,14 +425,15 @@ pub fn values<const D: usize>(
 pub(super) fn values_for<const D: usize>(
     picture: (&str, &RenderPlan),
     computation: &Computation,
-    run: &Run,
+    run: &mut Run,
     scene: &SceneRun<D>,
 ) -> Result<Estimates, StageError> {
     let count = scene.session.mesh().vertices.len();
     let mut left = computation.most_rays().saturating_mul(count as u64) / 4;
     let mut mask = vec![false; count];
-    let mask = mark_seen(picture, run, scene, &mut left, &mut mask)?.then_some(mask);
+    let mask = mark_seen(picture, run, scene, None, &mut left, &mut mask)?.then_some(mask);
     let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
+    run.work.vertices += asked as u64;
     let _running = run.progress.stage(&format!("occlusion of {}", picture.0), asked as u64);
     Ok(scene.session.occlusion(computation.estimator(), mask.as_deref(), run.progress)?)
 }
@@ -410,14 +441,137 @@ pub(super) fn values_for<const D: usize>(
 fn compute<const D: usize>(
     me: Ref<OcclusionPlan>,
     computation: &Computation,
-    run: &Run,
+    run: &mut Run,
     scene: &SceneRun<D>,
 ) -> Result<Estimates, StageError> {
     let mask = mask(me, computation, run, scene)?;
     let count = scene.session.mesh().vertices.len();
     let asked = mask.as_ref().map_or(count, |mask| mask.iter().filter(|&&m| m).count());
+    run.work.vertices += asked as u64;
     let _running = run.progress.stage(&format!("occlusion {}", run.plan.id(me)), asked as u64);
     Ok(scene.session.occlusion(computation.estimator(), mask.as_deref(), run.progress)?)
+}
+
+/// Whether some file wants the values of all vertices, when all pieces of a run are joined if not before.
+fn wants_all(me: Ref<OcclusionPlan>, plan: &Plan) -> bool {
+    // Pictures need to know what they show, no more.
+    let pictures = |stage| Piece::all(1).any(|all| plan.pictures(stage, all).is_some());
+    let stages = || (0..plan.stages.len()).any(|stage| plan.wants_values(stage, me.index()) && !pictures(stage));
+    let shown = |write: &WritePlan| plan[write.render].occlusion == Some(me) && write.has_mesh();
+    let computed = matches!(plan[me].source, OcclusionSource::Compute(_));
+    computed && (plan[me].file.is_some() || plan.all::<WritePlan>().any(|(_, write)| shown(write)) || stages())
+}
+
+/// Whether some file wants directions at all vertices.
+fn wants_directions(me: Ref<OcclusionPlan>, plan: &Plan) -> bool {
+    let shown =
+        |write: &WritePlan| plan[write.render].occlusion == Some(me) && write.has_mesh() && write.has_directions();
+    plan.all::<WritePlan>().any(|(_, write)| shown(write))
+}
+
+/// What a piece of a run needs to know: its share of the vertices, if some file wants all of them, which it keeps; those
+/// that its parts of pictures show, and its parts of meshes.
+fn in_piece<const D: usize>(
+    me: Ref<OcclusionPlan>,
+    computation: &Computation,
+    run: &mut Run,
+    scene: &SceneRun<D>,
+) -> Result<Estimates, StageError> {
+    let (plan, count) = (run.plan, scene.session.mesh().vertices.len());
+    let mut found = Estimates { values: vec![1.0; count], errors: vec![f32::NAN; count], rays: 0 };
+    let Some(piece) = plan.piece else { return Ok(found) };
+    let mut share = 0..0;
+    if wants_all(me, plan) {
+        share = piece.share(count);
+        let file = piece::values_of(me.nth());
+        let path = plan.out.join(&file);
+        let kept = Values::read(&path).ok().filter(|kept| !run.is_stale(&file) && kept.range() == share);
+        let own = match kept {
+            Some(kept) => kept,
+            None => {
+                let asked: Vec<bool> = (0..count).map(|v| share.contains(&v)).collect();
+                let Estimates { values, errors, rays } = only(me, computation, &asked, run, scene)?;
+                let vectors = match wants_directions(me, plan) {
+                    true => scene.vectors_at(me, share.clone().collect(), run)?.iter().flatten().copied().collect(),
+                    false => Vec::new(),
+                };
+                let (values, errors) = (values[share.clone()].to_vec(), errors[share.clone()].to_vec());
+                let own = Values { first: share.start, values, errors, rays, vectors };
+                let bytes = write_whole(&path, &own.to_bytes())?;
+                run.made_beside(&file, bytes)?;
+                own
+            }
+        };
+        found.rays = own.rays;
+        found.values[share.clone()].copy_from_slice(&own.values);
+        found.errors[share.clone()].copy_from_slice(&own.errors);
+    }
+    let mut more = shown_in_piece(me, piece, computation, run, scene)?;
+    more[share].fill(false);
+    if more.contains(&true) {
+        let Estimates { values, errors, rays } = only(me, computation, &more, run, scene)?;
+        found.rays += rays;
+        for v in (0..count).filter(|&v| more[v]) {
+            (found.values[v], found.errors[v]) = (values[v], errors[v]);
+        }
+    }
+    Ok(found)
+}
+
+/// The values where the mask says so.
+fn only<const D: usize>(
+    me: Ref<OcclusionPlan>,
+    computation: &Computation,
+    mask: &[bool],
+    run: &mut Run,
+    scene: &SceneRun<D>,
+) -> Result<Estimates, StageError> {
+    let asked = mask.iter().filter(|&&m| m).count() as u64;
+    run.work.vertices += asked;
+    let _running = run.progress.stage(&format!("occlusion {}", run.plan.id(me)), asked);
+    Ok(scene.session.occlusion(computation.estimator(), Some(mask), run.progress)?)
+}
+
+/// The vertices that a piece's parts of pictures and meshes show, of those that have to be made.
+fn shown_in_piece<const D: usize>(
+    me: Ref<OcclusionPlan>,
+    piece: Piece,
+    computation: &Computation,
+    run: &Run,
+    scene: &SceneRun<D>,
+) -> Result<Vec<bool>, StageError> {
+    let (plan, mesh) = (run.plan, scene.session.mesh());
+    let mut mask = vec![false; mesh.vertices.len()];
+    let is_stale = |stage: usize| plan.files_of(stage).into_iter().any(|file| run.is_stale(file));
+    let of_write = |write: &WritePlan| {
+        plan[write.render].occlusion == Some(me) && !write.stale(write::Content::Mesh, &|f| run.is_stale(f)).is_empty()
+    };
+    let wants = |stage: usize| plan.wants_values(stage, me.index()) && is_stale(stage);
+    let frames = |stage: usize| plan.pictures(stage, piece);
+    if plan.all::<WritePlan>().any(|(_, write)| of_write(write))
+        || (0..plan.stages.len()).any(|stage| wants(stage) && frames(stage).is_none())
+    {
+        let own = piece.share(mesh.vertices.len());
+        mesh.simplices.iter().filter(|s| write::has_first(&own, s)).flatten().for_each(|&v| mask[v as usize] = true);
+    }
+    let mut left = computation.most_rays().saturating_mul(mesh.vertices.len() as u64) / 4;
+    let mut pictures = Vec::new();
+    for (stage, render) in plan.all::<RenderPlan>() {
+        let values = render.occlusion == Some(me) && render.shading != render::Shading::Voxel;
+        if values && render::is_stale(stage, plan, &|file| run.is_stale(file)) {
+            pictures.push((plan.id(stage).to_owned(), render.clone(), piece.layers(render.dimensions[2], stage.nth())));
+        }
+    }
+    for stage in (0..plan.stages.len()).filter(|&stage| plan.wants_values(stage, me.index())) {
+        let frames = frames(stage).unwrap_or_default().into_iter().filter(|(file, _)| run.is_stale(file));
+        pictures.extend(frames.map(|(file, render)| (file.display().to_string(), render, None)));
+    }
+    for (name, render, slab) in pictures {
+        if !mark_seen((&name, &render), run, scene, slab.as_ref(), &mut left, &mut mask)? {
+            return Ok(vec![true; mesh.vertices.len()]);
+        }
+    }
+    Ok(mask)
 }
 
 /// The vertices of the simplices that some voxel shows, of the pictures that have to be made; none if all values are
@@ -442,7 +596,7 @@ fn mask<const D: usize>(
     for (stage, render) in plan.all::<RenderPlan>() {
         let values = render.occlusion == Some(me) && render.shading != render::Shading::Voxel;
         if values && render::is_stale(stage, plan, &|file| run.is_stale(file)) {
-            let seen = mark_seen((plan.id(stage), render), run, scene, &mut left, &mut mask)?;
+            let seen = mark_seen((plan.id(stage), render), run, scene, None, &mut left, &mut mask)?;
             if !seen {
                 return Ok(None);
             }

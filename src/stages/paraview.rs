@@ -14,6 +14,7 @@ use super::animate::AnimatePlan;
 use super::camera::camera;
 use super::cut::{Axis, Cut};
 use super::describe::Counts;
+use super::piece;
 use super::range::{check_length, positive};
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
@@ -203,7 +204,7 @@ impl Shown {
     }
 
     /// The render that it is an image of.
-    fn render(self, plan: &Plan) -> Option<Ref<RenderPlan>> {
+    pub(super) fn render(self, plan: &Plan) -> Option<Ref<RenderPlan>> {
         match self {
             Self::Image(write) => Some(plan[write].render),
             Self::Animation(animation) => Some(plan[animation].render),
@@ -212,7 +213,7 @@ impl Shown {
     }
 
     /// What its files hold.
-    fn arrays(self, plan: &Plan) -> &[Aov] {
+    pub(super) fn arrays(self, plan: &Plan) -> &[Aov] {
         match self {
             Self::Image(write) => &plan[write].arrays,
             Self::Animation(animation) => &plan[animation].arrays,
@@ -356,6 +357,10 @@ impl Stage for FigurePlan {
     /// Writes the state, if it isn't there already.
     fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
         let (plan, figure) = (run.plan, &run.plan[me]);
+        // Of pieces the first shows the parts of all, where parts are listed.
+        if plan.piece.is_some_and(|piece| piece.index() > 0 || !figure.has_parts()) {
+            return Ok("made when the pieces are joined".to_owned());
+        }
         let state = state(plan, figure)?;
         let path = plan.out.join(&figure.state);
         let unchanged = !run.force && holds(&path, state.as_bytes());
@@ -365,6 +370,15 @@ impl Stage for FigurePlan {
         let bytes = state.len() as u64;
         run.ledger.record(Made { file: &figure.state, bytes, notes: Vec::new(), named: true, unchanged })?;
         Ok(String::new())
+    }
+}
+
+impl FigurePlan {
+    /// Whether it can show the parts of a run's pieces: lists are those of images, and what is drawn of the scene is made later.
+    fn has_parts(&self) -> bool {
+        let drawn_over = self.edges.is_some_and(|edges| edges.over.is_some());
+        let images = self.writes.iter().all(|shown| matches!(shown, Shown::Image(_)));
+        self.reader == Reader::Vti && images && !drawn_over
     }
 }
 
@@ -613,7 +627,9 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             }
             .replace(['-', '_'], " "),
         };
-        let files = files.into_iter().map(|file| beside(&figure.state, file)).collect();
+        // Of pieces a figure shows the lists of all parts.
+        let shown = |file: &Path| plan.piece.map_or_else(|| file.to_owned(), |_| piece::list_of(file));
+        let files = files.into_iter().map(|file| beside(&figure.state, &shown(file))).collect();
         let fits = |wireframe: &Ref<WireframePlan>| {
             matches!(write, Shown::Image(_)) && plan[*wireframe].render().is_some_and(|render| Some(render) == view)
         };

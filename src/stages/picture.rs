@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use super::camera;
 use super::lighting::{self, LightFound, LightingPlan};
 use super::occlusion::OcclusionSource;
+use super::piece::{Bits, Record, Slab};
 use super::render::{RenderPlan, Shading, rays_of};
 use super::write::PictureFiles;
 use super::{Needs, Plan, Run, SceneRun, StageError};
@@ -18,7 +19,7 @@ use crate::io;
 use crate::occlusion::Estimator;
 use crate::progress::Progress;
 use crate::render::filters::denoise::Refine;
-use crate::render::filters::{Dilate, ImageFilter, denoise};
+use crate::render::filters::{self, Dilate, ImageFilter, denoise};
 use crate::render::{self, Accuracy, Aov, Columns, NOTHING, Renderer, Skylight};
 use crate::volume::Grid;
 
@@ -46,6 +47,9 @@ impl RenderPlan {
         if render.screen_space.is_some() {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OCCLUSION;
             (whole, holds) = (size_of::<f32>() as u64, "one layer of its picture and the depth of all of it");
+            if render.lighting.as_ref().is_some_and(|lighting| lighting.bounce) {
+                (whole, holds) = (8 * whole, "one layer of its picture, and of all of it the depth and the light");
+            }
         }
         if render.denoise {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OBJECT | Columns::INTERPOLATED;
@@ -60,11 +64,11 @@ impl RenderPlan {
         Needs { memory: memory.saturating_add(render.voxels().saturating_mul(whole)), disk: 0, holds }
     }
 
-    /// Makes the picture, and the files that `open` opens for it; `name` is what it is called where progress is told.
+    /// Makes the picture, or some layers of it, and the files that `open` opens for what is made; `name` is what it is called where progress is told.
     /// Values at vertices must be known where they are shown, and the light of the sky and of other surfaces found.
     pub(super) fn picture<const D: usize>(
         &self,
-        name: &str,
+        (name, part): (&str, Option<Slab>),
         plan: &Plan,
         scene: &SceneRun<D>,
         skylight: Option<Arc<Skylight<D>>>,
@@ -78,32 +82,53 @@ impl RenderPlan {
         picture.layers = render.layers;
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
         picture.skylight = skylight;
-        picture.filters = filters(plan, render, &picture);
+        picture.filters = filters_of(plan, render, &picture);
         picture.audit = render.audit(plan);
         let start = Instant::now();
         let hash = scene.session.mesh_hash();
-        let mut files = open(&picture.grid, hash)?;
+        let all = picture.grid.dimensions[2];
+        let layers = part.as_ref().map_or(0..all, Slab::layers);
+        let border = part.as_ref().map_or(all, |slab| slab.own.end);
+        let [width, height, _] = picture.grid.dimensions;
+        let mut files = open(&Grid { dimensions: [width, height, layers.len()], ..picture.grid }, hash)?;
         let aovs = files.aovs().to_vec();
         let (mut seen, mut behind) = (0, 0);
         // Two passes over the voxels: what is seen, and its shade; and, where that takes longest, another in the image.
-        let passes = 2 + u64::from(render.screen_space.is_some());
-        let running = progress.stage(name, passes * render.voxels());
-        let accuracy = picture.render(&aovs, None, progress, |slab| -> Result<(), StageError> {
-            seen += slab.seen;
-            behind += slab.behind;
-            Ok(files.add_slab(slab.layers.start, &slab.arrays)?)
-        })?;
+        let follows_light = picture.skylight.as_ref().is_some_and(|light| light.in_image == Some(true));
+        let passes = 2 + u64::from(render.screen_space.is_some()) + u64::from(follows_light);
+        let looked_at = part.as_ref().map_or(0..all, |slab| slab.looked_at(filters::reach(&picture.filters), all));
+        let running = progress.stage(name, passes * (looked_at.len() * picture.grid.layer_len()) as u64);
+        let first = layers.start;
+        let made =
+            picture.render_layers(layers, Some(border), &aovs, None, progress, |slab| -> Result<(), StageError> {
+                // The layer that is the next part's too is counted there.
+                if slab.layers.start < border {
+                    seen += slab.seen;
+                    behind += slab.behind;
+                }
+                Ok(files.add_slab(slab.layers.start - first, &slab.arrays)?)
+            })?;
+        let mut accuracy = None;
+        let mut checked = Vec::new();
+        match (made.audit, &part) {
+            (Some(audit), None) => accuracy = audit.finish(&*picture.backend, progress)?,
+            (Some(audit), Some(_)) => checked.extend(audit.candidates().map(Bits::new)),
+            (None, _) => {}
+        }
         running.end();
         if let Some(accuracy) = &accuracy {
             files.tell(accuracy);
         }
         let rendering = start.elapsed();
-        let nothing = seen == 0 && !scene.session.mesh().simplices.is_empty();
+        let behind = if picture.shading.is_interpolated() { behind } else { 0 };
+        // Of a part that is no news.
+        let nothing = part.is_none() && seen == 0 && !scene.session.mesh().simplices.is_empty();
         let lit = picture.lighting.as_ref().filter(|_| seen > 0 && aovs.iter().any(|aov| aov.is_lit()));
         Ok(Picture {
-            voxels: render.voxels(),
+            voxels: made.voxels,
             seen,
-            behind: if picture.shading.is_interpolated() { behind } else { 0 },
+            behind,
+            record: part.map(|slab| Record { layers: [slab.own.start, slab.own.end], seen, behind, checked }),
             accuracy,
             nothing: nothing.then(|| nothing_seen(&picture)),
             in_vain: lit.map_or_else(Vec::new, lighting::in_vain),
@@ -116,12 +141,14 @@ impl RenderPlan {
 
 /// What came of a picture.
 pub(super) struct Picture {
-    /// How many voxels it has.
+    /// How many voxels were made.
     pub voxels: u64,
     /// How many voxels see something.
     pub seen: u64,
     /// How many of them see a surface from behind, with the occlusion of its front.
     pub behind: u64,
+    /// Of a part what is known of it beside its voxels.
+    pub record: Option<Record>,
     /// How far off it is.
     pub accuracy: Option<Accuracy>,
     /// Why it shows nothing, if it does though there is something.
@@ -145,12 +172,13 @@ pub(super) fn array_bytes(aov: Aov, dimension: Dimension, layers: usize) -> u64 
     (bytes * aov.count(layers)) as u64
 }
 
-/// Marks the vertices of the simplices that a render shows, unless that costs more than is `left` to spend on it.
+/// Marks the vertices of the simplices that a render shows, or some layers of it and those around that filters look at, unless that costs more than is `left` to spend on it.
 /// Returns whether it did.
 pub(super) fn mark_seen<const D: usize>(
     (name, render): (&str, &RenderPlan),
     run: &Run,
     scene: &SceneRun<D>,
+    part: Option<&Slab>,
     left: &mut u64,
     mask: &mut [bool],
 ) -> Result<bool, StageError> {
@@ -158,20 +186,31 @@ pub(super) fn mark_seen<const D: usize>(
     if run.plan[render.scene].is_translucent() || render.arrays.contains(&Aov::LayerAmbientOcclusion) {
         return Ok(false);
     }
-    let camera = camera::camera(&render.camera)?;
+    let camera = camera::camera::<D>(&render.camera)?;
     // All samples, not the voxels' centres alone.
     let samples = |a: usize| if a < D - 1 { render.dimensions[a] * render.supersample } else { 1 };
     let grid = camera.grid(std::array::from_fn(samples));
     let backend = Arc::clone(scene.session.backend()?);
     let visibility = render::Visibility::new(backend, &camera, &grid, render.visibility);
-    *left = left.saturating_sub(visibility.cost());
+    let all = grid.dimensions[2];
+    let layers = match part {
+        None => 0..all,
+        Some(slab) => {
+            let picture = scene.session.renderer(camera, render.dimensions, render::Shading::None)?;
+            let reach = filters::reach(&filters_of(run.plan, render, &picture));
+            let looked_at = slab.looked_at(reach, render.dimensions[2]);
+            let fine = all / render.dimensions[2];
+            looked_at.start * fine..looked_at.end * fine
+        }
+    };
+    *left = left.saturating_sub((u128::from(visibility.cost()) * layers.len() as u128 / all as u128) as u64);
     if *left == 0 {
         return Ok(false);
     }
-    let _running = run.progress.stage(&format!("what {name} shows"), render.voxels());
-    let thick = (SLAB_BYTES / size_of::<u32>() / grid.layer_len()).clamp(1, grid.dimensions[2]);
-    for first in (0..grid.dimensions[2]).step_by(thick) {
-        let layers = first..grid.dimensions[2].min(first + thick);
+    let _running = run.progress.stage(&format!("what {name} shows"), (grid.layer_len() * layers.len()) as u64);
+    let thick = (SLAB_BYTES / size_of::<u32>() / grid.layer_len()).clamp(1, all);
+    for first in layers.clone().step_by(thick) {
+        let layers = first..layers.end.min(first + thick);
         let mut last = NOTHING;
         for simplex in visibility.first_hits(layers, run.progress)? {
             if simplex != NOTHING && simplex != last {
@@ -203,7 +242,7 @@ fn shading<const D: usize>(plan: &Plan, render: &RenderPlan, scene: &SceneRun<D>
 }
 
 /// What looks at neighbouring voxels, in this order.
-fn filters<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<D>) -> Vec<Box<dyn ImageFilter<D>>> {
+fn filters_of<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<D>) -> Vec<Box<dyn ImageFilter<D>>> {
     let mut filters: Vec<Box<dyn ImageFilter<D>>> = Vec::new();
     if let Some(sampling) = rays_of(plan, render).filter(|_| render.denoise) {
         filters.extend(denoise(&picture.camera, &picture.grid, sampling));
@@ -219,12 +258,13 @@ fn filters<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Renderer<
 }
 
 /// Why a picture shows nothing.
-fn nothing_seen<const D: usize>(picture: &Renderer<D>) -> String {
+pub(super) fn nothing_seen<const D: usize>(picture: &Renderer<D>) -> String {
     let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
     if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
-        "the scene lies wholly behind the camera; turn the camera, or move it back"
+        "the scene lies wholly behind the camera; let `camera: fit` place it, or turn it, or move it back"
     } else {
-        "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"
+        "no voxel's centre sees any of the scene; let `camera: fit` place the camera, look at the scene's place and size, or \
+         use more voxels"
     }
     .to_owned()
 }

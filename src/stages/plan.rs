@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::{Invalid, Stage, StagePlan};
+use super::{Invalid, Keys, Output, Piece, Stage, StagePlan};
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub struct Plan {
     pub stages: Vec<Planned>,
     /// What is allowed but probably not meant.
     pub warnings: Vec<Invalid>,
+    /// The piece of the run that this is the plan of, if not of all; `out` is its own folder then.
+    pub piece: Option<Piece>,
 }
 
 /// A stage of a plan. Id and path are no part of any key: they name the stage, in the pipeline and in messages.
@@ -149,6 +151,24 @@ impl Plan {
     pub fn all_files_of(&self, index: usize) -> Vec<PathBuf> {
         let named = self.files_of(index).into_iter().map(Path::to_owned);
         named.chain(self.files_beside(index)).collect()
+    }
+
+    /// The files that a stage leaves and the cache knows, each with its key; of a piece its parts.
+    pub fn left(&self, index: usize, keys: &Keys) -> Vec<Output> {
+        match self.piece {
+            None => self.outputs(index, keys),
+            Some(piece) => self.left_by(index, keys, piece),
+        }
+    }
+
+    /// The same of a piece.
+    pub fn left_by(&self, index: usize, keys: &Keys, piece: Piece) -> Vec<Output> {
+        self.parts(index, keys, piece).into_iter().map(|output| piece.keyed(output, keys)).collect()
+    }
+
+    /// The same plan for a piece of the run.
+    pub fn in_piece(&self, piece: Piece) -> Self {
+        Self { out: piece.folder(&self.out), piece: Some(piece), ..self.clone() }
     }
 
     /// Every file that the pipeline names in `out`, in the order of the stages.

@@ -13,16 +13,19 @@ use super::camera::{self, CameraPlan, CameraSpec, ProjectionPlan};
 use super::describe::{Counts, Totals, grouped};
 use super::lighting::{self, DepthCueSpec, LightAsked, LightSpec, LightingKeys, LightingPlan, SkySpec};
 use super::occlusion::{self, OcclusionPlan, OcclusionSource};
+use super::picture::nothing_seen;
+use super::piece::{self, Joined, Record};
 use super::scene::ScenePlan;
 use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
 use super::subject::scene_and_occlusion;
-use super::write::{Content, PictureFiles, WritePlan};
+use super::write::{self, Content, PictureFiles, WritePlan, write_whole};
 use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
 use crate::geometry::Dimension;
 use crate::render::visibility::Method as Visibility;
-use crate::render::{Accuracy, Aov, MOST_LAYERS, MOST_SAMPLES};
+use crate::render::{Accuracy, Aov, Audit, CameraError, MOST_LAYERS, MOST_SAMPLES, Shading as Shaded};
 use crate::text::number;
 use crate::trace::Sampling;
+use crate::volume::Grid;
 
 /// The most voxels along an axis.
 pub const MAX_DIMENSION: u64 = 65_535;
@@ -48,7 +51,9 @@ pub struct RenderSpec {
     pub occlusion: Option<String>,
     /// With `occlusion: screen_space`: how it is looked for.
     pub screen_space: Option<ScreenSpaceSpec>,
-    /// Where it is seen from.
+    /// Where it is seen from; `fit` from where the scene just fits the image.
+    #[serde(default, deserialize_with = "camera::fit_or_keys")]
+    #[schemars(schema_with = "camera::fit_or_keys_schema")]
     pub camera: Option<CameraSpec>,
     /// Voxels along x, y and z; in 3D pixels along x and y.
     pub dimensions: Vec<u64>,
@@ -85,7 +90,7 @@ pub struct RenderSpec {
     /// With 1, surfaces are also lit by what other surfaces reflect of the sky, once (default 0); not of `lights`.
     #[schemars(range(min = 0, max = 1))]
     pub bounce: Option<u64>,
-    /// The share of the lights that surfaces reflect in highlights (default 0).
+    /// The share of the lights that surfaces reflect in highlights (default 0); objects may say their own.
     #[schemars(range(min = 0, max = 1))]
     pub specular: Option<f64>,
     /// The exponent of highlights: the higher, the smaller they are (default 30).
@@ -157,6 +162,7 @@ impl RenderSpec {
             specular: self.specular,
             shininess: self.shininess,
             depth_cue: self.depth_cue.as_ref(),
+            is_glossy: false,
         }
     }
 }
@@ -182,7 +188,15 @@ impl RenderPlan {
 
     /// Why nothing is known of the directions in which the sky is open, if so.
     pub(super) fn no_directions(&self, plan: &Plan) -> Option<String> {
-        no_directions(plan, self.scene, self.occlusion, self.screen_space.is_some())
+        no_directions(plan, self.scene, self.occlusion)
+    }
+
+    /// Where its voxels are.
+    pub(super) fn grid(&self, plan: &Plan) -> Result<Grid, CameraError> {
+        Ok(match plan[self.scene].dimension {
+            Dimension::Three => camera::camera::<3>(&self.camera)?.grid(self.dimensions),
+            Dimension::Four => camera::camera::<4>(&self.camera)?.grid(self.dimensions),
+        })
     }
 
     /// The number of voxels.
@@ -270,11 +284,13 @@ impl Stage for RenderPlan {
         let layers = within("layers", spec.layers, 0, 1, MOST_LAYERS)?;
         let halo = if dimension == Dimension::Four { 3 } else { 0 };
         let dilate = within("dilate", spec.dilate, halo, 0, MAX_DILATION)?;
-        let lighting = lighting::plan(spec.lighting_keys(), path, dimension, &mut resolver.plan.warnings)?;
+        let keys = LightingKeys { is_glossy: resolver.plan[scene].is_glossy(), ..spec.lighting_keys() };
+        let lighting = lighting::plan(keys, path, dimension, &mut resolver.plan.warnings)?;
         for (key, given) in [("sky", spec.sky.is_some()), ("bounce", lighting.as_ref().is_some_and(|l| l.bounce))] {
             let needed = "needs an occlusion, which tells how much light reaches a surface";
-            let lacks = || (key == "bounce" && occlusion.is_none()).then(|| needed.to_owned());
-            let refusal = no_directions(&resolver.plan, scene, occlusion, screen_space.is_some()).or_else(lacks);
+            let is_dark = occlusion.is_some() || screen_space.is_some();
+            let lacks = || (key == "bounce" && !is_dark).then(|| needed.to_owned());
+            let refusal = no_directions(&resolver.plan, scene, occlusion).or_else(lacks);
             if let Some(message) = refusal.filter(|_| given) {
                 return Err(Invalid::new(format!("{path}.{key}"), message));
             }
@@ -384,14 +400,21 @@ impl Stage for RenderPlan {
             return Ok("as it was".to_owned());
         }
         let render = &plan[me];
+        if let Some(joined) = run.joined.clone() {
+            return join(me, &joined, run, scene);
+        }
+        // There is none only if nothing is stale.
+        let slab = plan.piece.and_then(|piece| piece.layers(render.dimensions[2], me.nth()));
+        let first_layer = slab.as_ref().map_or(0, |slab| slab.own.start);
         if let Some(occlusion) = render.occlusion.filter(|_| render.shading != Shading::Voxel) {
             occlusion::values(occlusion, run, scene)?;
         }
         let skylight = scene.skylight(render.occlusion, render.light_asked(&render.arrays), run)?;
         let name = format!("render {}", plan.id(me));
-        let made = render.picture(&name, plan, scene, skylight, run.progress, |grid, hash| {
-            PictureFiles::create(me, plan, run.told, &|file| run.is_stale(file), grid, hash)
+        let made = render.picture((&name, slab), plan, scene, skylight, run.progress, |grid, hash| {
+            PictureFiles::create(me, run, grid, first_layer, hash)
         })?;
+        run.work.voxels += made.voxels;
         let mut notes: Vec<String> =
             made.nothing.iter().map(|why| format!("{name} shows background only: {why}")).collect();
         notes.extend(made.in_vain.iter().map(|told| format!("{name}: {told}")));
@@ -399,42 +422,79 @@ impl Stage for RenderPlan {
             let rays = format!("{} of the {} rays", grouped(light.behind), grouped(light.hits));
             notes.extend(light.notes(&rays).iter().map(|told| format!("{name}: {told}")));
         }
-        if made.behind > 0 {
-            notes.push(format!(
-                "render {}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
-                 turn that object by `orientation: eye`, or take `shading: voxel`",
-                plan.id(me),
-                grouped(made.behind),
-                grouped(made.seen)
-            ));
-        }
+        notes.extend(from_behind(plan.id(me), made.behind, made.seen));
         for (file, bytes) in made.files {
+            if let Some(record) = &made.record {
+                // Of the files of a picture only `.vti` tell how far off it is.
+                let checked =
+                    if file.extension().is_some_and(|e| e == "vti") { record.checked.clone() } else { Vec::new() };
+                let (path, record) = (piece::record_of(&file), Record { checked, ..record.clone() });
+                let bytes = write_whole(&plan.out.join(&path), record.to_json().as_bytes())?;
+                run.made_beside(&path, bytes)?;
+            }
             run.made(&file, bytes, notes.clone())?;
         }
-        let rate = render.voxels() as f64 / made.rendering.as_secs_f64() / 1e6;
-        let off = made.accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
-            format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
+        let rate = made.voxels as f64 / made.rendering.as_secs_f64() / 1e6;
+        let own = made.record.map_or(render.voxels(), |record| {
+            (record.layers[1] - record.layers[0]) as u64 * render.voxels() / render.dimensions[2] as u64
         });
         Ok(format!(
-            "{} of {} voxels see something, {rate:.2} million voxels a second{off}",
+            "{} of {} voxels see something, {rate:.2} million voxels a second{}",
             grouped(made.seen),
-            grouped(render.voxels())
+            grouped(own),
+            off(made.accuracy)
         ))
     }
 }
 
-/// Why nothing is known of the directions in which the sky is open, if so.
-fn no_directions(
-    plan: &Plan,
-    scene: Ref<ScenePlan>,
-    occlusion: Option<Ref<OcclusionPlan>>,
-    in_screen_space: bool,
-) -> Option<String> {
-    if in_screen_space {
-        let message = "`screen_space` tells how much of the sky is hidden, not where it is open; take the occlusion of an \
-                       `occlusion` stage";
-        return Some(message.to_owned());
+/// Makes the files of a picture of the parts of all pieces.
+fn join<const D: usize>(
+    me: Ref<RenderPlan>,
+    joined: &Joined,
+    run: &mut Run,
+    scene: &SceneRun<D>,
+) -> Result<String, StageError> {
+    let (plan, render, name) = (run.plan, &run.plan[me], format!("render {}", run.plan.id(me)));
+    let running = run.progress.stage(&name, render.voxels());
+    let grid = render.grid(plan)?;
+    let audit = render.audit(plan).map(Audit::<D>::new);
+    let made = write::join(me, joined, run, (&grid, scene.session.mesh_hash()), audit, |audit| {
+        Ok(audit.finish(&**scene.session.backend()?, run.progress)?)
+    })?;
+    running.end();
+    let mut notes: Vec<String> = from_behind(plan.id(me), made.behind, made.seen).into_iter().collect();
+    if made.seen == 0 && !scene.session.mesh().simplices.is_empty() {
+        let picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, Shaded::None)?;
+        notes.push(format!("{name} shows background only: {}", nothing_seen(&picture)));
     }
+    for (file, bytes) in made.files {
+        run.made(&file, bytes, notes.clone())?;
+    }
+    let (seen, voxels, off) = (grouped(made.seen), grouped(render.voxels()), off(made.accuracy));
+    Ok(format!("{seen} of {voxels} voxels see something, joined of {} pieces{off}", joined.count()))
+}
+
+/// What is told of voxels that see a surface from behind.
+fn from_behind(id: &str, behind: u64, seen: u64) -> Option<String> {
+    (behind > 0).then(|| {
+        format!(
+            "render {id}: {} of the {} voxels that see something see a surface from behind, with the occlusion of its front; \
+             turn that object by `orientation: eye`, or take `shading: voxel`",
+            grouped(behind),
+            grouped(seen)
+        )
+    })
+}
+
+/// How far off a picture is, where that is known.
+fn off(accuracy: Option<Accuracy>) -> String {
+    accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
+        format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
+    })
+}
+
+/// Why nothing is known of the directions in which the sky is open, if so.
+fn no_directions(plan: &Plan, scene: Ref<ScenePlan>, occlusion: Option<Ref<OcclusionPlan>>) -> Option<String> {
     if let Some(name) = plan[scene].translucent() {
         return Some(format!(
             "{name} lets light through, and where the sky is open is found among opaque objects only; leave out `opacity` \

@@ -41,7 +41,8 @@ impl Plan {
             return Err(Invalid::new("stages", "there are no stages; begin with a `scene`"));
         }
         let out = out.unwrap_or_else(|| PathBuf::from("out").join(name));
-        let plan = Plan { name: name.to_owned(), seed, folder, out, stages: Vec::new(), warnings: Vec::new() };
+        let plan =
+            Plan { name: name.to_owned(), seed, folder, out, stages: Vec::new(), warnings: Vec::new(), piece: None };
         let (ids, all_ids) = (BTreeMap::new(), collect_ids(stages)?);
         let mut resolver = Resolver { plan, outputs: Outputs::default(), ids, all_ids };
         for (i, stage) in stages.iter().enumerate() {

@@ -5,7 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use serde::Serialize;
+
 use super::occlusion::OcclusionPlan;
+use super::piece::Joined;
 use super::prepare::Loaded;
 use super::{Plan, Ref, StageError};
 use crate::io;
@@ -46,6 +49,15 @@ pub struct Made<'a> {
     pub unchanged: bool,
 }
 
+/// What a run has computed: to be held against that of others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Vertices at which ambient occlusion was found.
+    pub vertices: u64,
+    /// Voxels whose shade was found, with those beyond a piece's own layers.
+    pub voxels: u64,
+}
+
 /// A run in progress.
 pub struct Run<'p> {
     /// What is to be done.
@@ -60,6 +72,10 @@ pub struct Run<'p> {
     pub loaded: BTreeMap<Ref<OcclusionPlan>, Loaded>,
     /// Whether all is made again.
     pub force: bool,
+    /// The pieces that were made before, if their parts are to be joined.
+    pub joined: Option<Joined>,
+    /// What was computed so far.
+    pub work: Work,
     /// Of stages whose work was done for the sake of a later one: how long it took, and what is worth telling.
     pub early: BTreeMap<usize, (Duration, String)>,
 }

@@ -1,7 +1,8 @@
-//! `shade`: ambient occlusion for an image that is there already, of which no scene is known.
+//! `shade`: ambient occlusion, and what comes of it, for an image that is there already, of which no scene is known.
 //!
 //! A `.vti` of whatever program, with the distance from the eye and the normal of what each voxel shows, is written again
-//! with `ambient_occlusion`, looked for in screen space ([`crate::render::screen_space`]). The camera is what the image
+//! with `ambient_occlusion`, looked for in screen space ([`crate::render::screen_space`]), and if wanted with where the sky is
+//! open and the light of the sky and of other surfaces. The camera is what the image
 //! tells itself, as those of `ao4d run` do, or what the pipeline says. An image that tells its camera may have been cut
 //! out of a larger one: its grid says where it lies. Of another all is taken to be there, as a render with that camera makes
 //! it.
@@ -15,18 +16,22 @@ use serde_json::{Value, json};
 
 use super::camera::{self, CameraPlan, CameraSpec};
 use super::describe::{Counts, grouped};
+use super::lighting::{self, SkySpec};
+use super::piece::Piece;
 use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
-use super::write::{PROGRAM, vti as picture};
+use super::write::{Encoding, PROGRAM, vti as picture};
 use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, Stage, StageError};
-use crate::geometry::{Dimension, Vector};
+use crate::geometry::{Dimension, Vector, Vector64, widen};
 use crate::io::{self, AtomicFile, PIPELINE, vti, vtk};
 use crate::occlusion::Cancelled;
 use crate::progress::Progress;
-use crate::render::DepthImage;
-use crate::volume::{Array, Volume};
+use crate::render::{Aov, DepthImage, Seen, reflectance};
+use crate::volume::{Array, Kind, Volume};
 
-/// The array that it adds.
-const OCCLUSION: &str = "ambient_occlusion";
+/// The arrays that it can add.
+const ARRAYS: [Aov; 4] = [Aov::AmbientOcclusion, Aov::BentNormal, Aov::Irradiance, Aov::Bounce];
+/// The colour of what has none: that of objects without one.
+const GREY: [f32; 3] = [0.8; 3];
 /// What images of `ao4d run` tell of how they were made.
 const SETTINGS: &str = "settings";
 
@@ -50,7 +55,17 @@ pub struct ShadeSpec {
     pub normal: Option<String>,
     /// How ambient occlusion is looked for.
     pub screen_space: Option<ScreenSpaceSpec>,
-    /// The file: `NAME.vti`, with all that the image has, and `ambient_occlusion`.
+    /// What is added: `ambient_occlusion` (default), `bent_normal`, `irradiance`, `bounce`.
+    pub arrays: Option<Vec<Aov>>,
+    /// The sky, for `irradiance` and `bounce` (default: one that shines on all sides alike).
+    pub sky: Option<SkySpec>,
+    /// With 1, surfaces are also lit by what other surfaces reflect of the sky, once (default 0).
+    #[schemars(range(min = 0, max = 1))]
+    pub bounce: Option<u64>,
+    /// With `bounce: 1`: the array of colours as a screen shows them, uint8 or numbers from 0 to 1, of which one or the first
+    /// three count (default: a light grey of 0.8 everywhere).
+    pub albedo: Option<String>,
+    /// The file: `NAME.vti`, with all that the image has, and what is added.
     pub vti: String,
 }
 
@@ -68,6 +83,14 @@ pub struct ShadePlan {
     pub normal: String,
     /// How occlusion is looked for.
     pub screen_space: ScreenSpacePlan,
+    /// What is added.
+    pub arrays: Vec<Aov>,
+    /// The sky's gradient, if it has one.
+    pub sky: Option<Vec<f64>>,
+    /// Whether the light of other surfaces is looked for.
+    pub bounce: bool,
+    /// The array of colours.
+    pub albedo: Option<String>,
     /// The file, below `out`.
     #[serde(serialize_with = "super::describe::path")]
     pub file: PathBuf,
@@ -101,6 +124,10 @@ impl Stage for ShadePlan {
                 resolver.warn(format!("{path}.dimension"), "has no effect without `camera`: the image tells its own");
                 None
             }
+            (Some(CameraSpec { fit: Some(true), .. }), _) => {
+                let message = "there is no scene that it could be fitted to; say where the image was seen from";
+                return Err(Invalid::new(format!("{path}.camera.fit"), message));
+            }
             (Some(camera), dimension) => {
                 let number = dimension.unwrap_or(4);
                 let dimension = Dimension::new(number).ok_or_else(|| {
@@ -111,9 +138,41 @@ impl Stage for ShadePlan {
         };
         let name = |given: &Option<String>, default: &str| given.as_deref().unwrap_or(default).to_owned();
         let screen_space = screen_space::plan(spec.screen_space.as_ref(), &format!("{path}.screen_space"))?;
+        let arrays = spec.arrays.clone().unwrap_or_else(|| vec![Aov::AmbientOcclusion]);
+        let refuse = |i: usize, message: String| Err(Invalid::new(format!("{path}.arrays[{i}]"), message));
+        for (i, aov) in arrays.iter().enumerate() {
+            if !ARRAYS.contains(aov) {
+                let known = ARRAYS.map(Aov::name).join(", ");
+                return refuse(i, format!("of an image alone `{}` is not known; take of {known}", aov.name()));
+            }
+            if arrays[..i].contains(aov) {
+                return refuse(i, format!("`{}` is there twice", aov.name()));
+            }
+        }
+        if arrays.is_empty() {
+            return Err(Invalid::new(
+                format!("{path}.arrays"),
+                "the list is empty; leave it out for `ambient_occlusion`",
+            ));
+        }
+        let bounce = lighting::bounce(spec.bounce, path)?;
+        if let (false, Some(i)) = (bounce, arrays.iter().position(|&aov| aov == Aov::Bounce)) {
+            return refuse(i, "no light is followed from surface to surface; say `bounce: 1`".to_owned());
+        }
+        let is_lit = arrays.iter().any(|aov| matches!(aov, Aov::Irradiance | Aov::Bounce));
+        for (key, is_given) in [("sky", spec.sky.is_some()), ("bounce", bounce)] {
+            if is_given && !is_lit {
+                resolver.warn(format!("{path}.{key}"), "has no effect without `irradiance` or `bounce` in `arrays`");
+            }
+        }
+        if spec.albedo.is_some() && !bounce {
+            resolver.warn(format!("{path}.albedo"), "has no effect without `bounce: 1`");
+        }
         let file = resolver.outputs.claim(&format!("{path}.vti"), &spec.vti, Some("vti"))?;
         let (depth, normal) = (name(&spec.depth, "depth"), name(&spec.normal, "normal"));
-        Ok(Self { image, camera, depth, normal, screen_space, file })
+        let sky = spec.sky.as_ref().map(|sky| sky.gradient.clone());
+        let albedo = spec.albedo.clone();
+        Ok(Self { image, camera, depth, normal, screen_space, arrays, sky, bounce, albedo, file })
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -140,13 +199,28 @@ impl Stage for ShadePlan {
         vec![Output::alone(&plan[me].file, keys.of(me.index()).to_owned())]
     }
 
+    /// One piece makes it.
+    fn parts(me: Ref<Self>, plan: &Plan, keys: &Keys, piece: Piece) -> Vec<Output> {
+        if piece.owns(me.nth()) { Self::outputs(me, plan, keys) } else { Vec::new() }
+    }
+
     fn retell(_: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, io::Error> {
         picture::retell(&plan.out.join(output), text)
     }
 
     fn written(me: Ref<Self>, plan: &Plan) -> Value {
-        let Self { camera, depth, normal, screen_space, .. } = &plan[me];
-        let mut written = json!({ "depth": depth, "normal": normal, "screen_space": screen_space.written() });
+        let Self { camera, depth, normal, screen_space, arrays, sky, bounce, albedo, .. } = &plan[me];
+        let mut written =
+            json!({ "depth": depth, "normal": normal, "screen_space": screen_space.written(), "arrays": arrays });
+        if let Some(gradient) = sky {
+            written["sky"] = json!({ "gradient": gradient });
+        }
+        if *bounce {
+            written["bounce"] = 1.into();
+            if let Some(name) = albedo {
+                written["albedo"] = json!(name);
+            }
+        }
         if let Some(camera) = camera {
             (written["camera"], written["dimension"]) = (camera.written(), camera.eye.len().into());
         }
@@ -171,12 +245,18 @@ impl Stage for ShadePlan {
         if !run.is_stale(&shade.file) {
             return Ok("as it was".to_owned());
         }
+        if let Some(joined) = &run.joined {
+            let (part, path) = (joined.owned(&shade.file, me.nth()), plan.out.join(&shade.file));
+            let bytes = picture::take(&part, &path, Encoding::Appended, run.told)?;
+            run.made(&shade.file, bytes, Vec::new())?;
+            return Ok("made by one piece".to_owned());
+        }
         // It was read before, but may have changed since.
         let image = shade.read().map_err(|message| Invalid::new(format!("{}.image", plan.path(me)), message))?;
         let running = run.progress.stage(&format!("shade {}", plan.id(me)), image.volume.grid.len() as u64);
         let found = match image.dimension {
-            Dimension::Three => shade.occlusion::<3>(&image, run.progress),
-            Dimension::Four => shade.occlusion::<4>(&image, run.progress),
+            Dimension::Three => shade.found::<3>(&image, run.progress),
+            Dimension::Four => shade.found::<4>(&image, run.progress),
         }?;
         running.end();
         let mut notes = Vec::new();
@@ -195,8 +275,9 @@ impl Stage for ShadePlan {
                 grouped(found.seen)
             ));
         }
-        let seen = format!("{} of {} points show something", grouped(found.seen), grouped(found.values.len() as u64));
-        let bytes = shade.write(&plan.out.join(&shade.file), run.told, image, found.values)?;
+        let seen =
+            format!("{} of {} points show something", grouped(found.seen), grouped(image.volume.grid.len() as u64));
+        let bytes = shade.write(&plan.out.join(&shade.file), run.told, image, found.arrays)?;
         run.made(&shade.file, bytes, notes)?;
         Ok(seen)
     }
@@ -210,9 +291,9 @@ struct Image {
     camera: CameraPlan,
 }
 
-/// Ambient occlusion of an image's points.
+/// What was found of an image's points.
 struct Found {
-    values: Vec<f32>,
+    arrays: Vec<Array>,
     /// Points that show something, and those of them that have no normal.
     seen: u64,
     without_normal: u64,
@@ -261,6 +342,15 @@ impl ShadePlan {
                 self.normal
             )));
         };
+        if let Some(gradient) = &self.sky {
+            let sky = SkySpec { gradient: gradient.clone() };
+            lighting::gradient(&sky, "gradient", dimension).map_err(|e| unusable(format!("of its `sky` the {e}")))?;
+        }
+        if let Some(name) = self.albedo.as_deref().filter(|_| self.bounce)
+            && volume.array(name).is_none()
+        {
+            return Err(unusable(format!("it lacks the array `{name}` (colours)")));
+        }
         if camera.eye.len() != dimension.get() {
             let (own, needed) = (camera.eye.len(), dimension.get());
             let remedy = if self.camera.is_some() { format!("; say `dimension: {needed}`") } else { String::new() };
@@ -275,46 +365,86 @@ impl ShadePlan {
         Ok(Image { time, dimension, camera, volume })
     }
 
-    /// The occlusion of all points.
-    fn occlusion<const D: usize>(&self, image: &Image, progress: &dyn Progress) -> Result<Found, StageError> {
+    /// What is added, for all points.
+    fn found<const D: usize>(&self, image: &Image, progress: &dyn Progress) -> Result<Found, StageError> {
         let camera = camera::camera::<D>(&image.camera)?;
         let own = &image.volume.grid;
         let grid = if self.camera.is_some() { camera.grid(own.dimensions) } else { *own };
         let numbers = |name: &str| image.volume.array(name).map(|array| &array.values);
         let (Some(depth), Some(normals)) = (numbers(&self.depth), numbers(&self.normal)) else {
-            return Ok(Found { values: Vec::new(), seen: 0, without_normal: 0 });
+            return Ok(Found { arrays: Vec::new(), seen: 0, without_normal: 0 });
         };
         let distances: Vec<f32> = (0..grid.len()).into_par_iter().map(|n| depth.get(n) as f32).collect();
-        let depth_image = DepthImage::<D>::new(&camera, &grid, distances, self.screen_space.settings());
-        let mut found: Vec<Option<Option<f32>>> = vec![None; grid.len()];
-        let width = grid.dimensions[0];
-        found.par_chunks_mut(width).enumerate().try_for_each(|(row, found)| {
-            if progress.cancelled() {
-                return Err(Cancelled);
-            }
-            for (i, found) in found.iter_mut().enumerate() {
-                let n = row * width + i;
-                if depth_image.shows(n) {
-                    let normal = Vector::<D>::from_fn(|r, _| normals.get(D * n + r) as f32);
-                    *found = Some(depth_image.occlusion_at(&normal, grid.index(n)));
+        let mut depth_image = DepthImage::<D>::new(&camera, &grid, distances, self.screen_space.settings());
+        if self.arrays != [Aov::AmbientOcclusion] {
+            depth_image = depth_image.directed();
+        }
+        let normal = |n: usize| Vector::<D>::from_fn(|r, _| normals.get(D * n + r) as f32);
+        let look = |image: &DepthImage<D>| -> Result<Vec<Option<Option<Seen<D>>>>, StageError> {
+            let mut found = vec![None; grid.len()];
+            let width = grid.dimensions[0];
+            found.par_chunks_mut(width).enumerate().try_for_each(|(row, found)| {
+                if progress.cancelled() {
+                    return Err(Cancelled);
                 }
-            }
-            progress.advance(width as u64);
-            Ok(())
-        })?;
+                for (i, found) in found.iter_mut().enumerate() {
+                    let n = row * width + i;
+                    if image.shows(n) {
+                        *found = Some(image.seen_at(&normal(n), grid.index(n)));
+                    }
+                }
+                progress.advance(width as u64);
+                Ok(())
+            })?;
+            Ok(found)
+        };
+        let gradient = self.sky.as_ref().map_or_else(Vector64::zeros, |g| Vector64::<D>::from_fn(|r, _| g[r]));
+        let sky = |seen: &Seen<D>| (f64::from(seen.open) + gradient.dot(&widen(&seen.vector))).max(0.0);
+        let mut found = look(&depth_image)?;
+        if self.bounce {
+            let colors = self.albedo.as_ref().and_then(|name| image.volume.array(name));
+            let light = |(n, seen): (usize, &Option<Option<Seen<D>>>)| {
+                if seen.is_none() {
+                    return ([0.0; 3], Vector::zeros());
+                }
+                // What has no normal is left open.
+                let arrives = seen.as_ref().and_then(|seen| seen.as_ref()).map_or(1.0, sky);
+                let light = reflectance(colors.map_or(GREY, |array| color(array, n))).map(|c| (c * arrives) as f32);
+                (light, normal(n))
+            };
+            depth_image = depth_image.lit(found.par_iter().enumerate().map(light).collect());
+            found = look(&depth_image)?;
+        }
+        let of_points = |value: &(dyn Fn(Option<&Seen<D>>) -> Vec<f32> + Sync)| -> Vec<f32> {
+            found.par_iter().flat_map_iter(|seen| value(seen.as_ref().and_then(|seen| seen.as_ref()))).collect()
+        };
+        let array = |aov: &Aov| {
+            let values = match aov {
+                Aov::BentNormal => {
+                    of_points(&|seen| seen.map_or_else(Vector::zeros, |seen| seen.vector).iter().copied().collect())
+                }
+                Aov::Bounce => of_points(&|seen| seen.map_or([0.0; 3], |seen| seen.bounced).to_vec()),
+                Aov::Irradiance => of_points(&|seen| {
+                    seen.map_or([1.0; 3], |seen| seen.bounced.map(|c| (sky(seen) + f64::from(c)) as f32)).to_vec()
+                }),
+                _ => of_points(&|seen| vec![seen.map_or(1.0, |seen| seen.open)]),
+            };
+            Array::new(aov.name(), aov.components::<D>(), values)
+        };
         Ok(Found {
             seen: found.iter().flatten().count() as u64,
-            without_normal: found.iter().flatten().filter(|value| value.is_none()).count() as u64,
-            values: found.into_iter().map(|value| value.flatten().unwrap_or(1.0)).collect(),
+            without_normal: found.iter().flatten().filter(|seen| seen.is_none()).count() as u64,
+            arrays: self.arrays.iter().map(array).collect(),
         })
     }
 
-    /// Writes the image with its occlusion; returns the file's length.
-    fn write(&self, path: &Path, told: &str, image: Image, values: Vec<f32>) -> Result<u64, io::Error> {
+    /// Writes the image with what is added; returns the file's length.
+    fn write(&self, path: &Path, told: &str, image: Image, arrays: Vec<Array>) -> Result<u64, io::Error> {
         let Image { mut volume, time, .. } = image;
-        let replaced = volume.array(OCCLUSION).is_some();
-        volume.arrays.retain(|array| array.name != OCCLUSION);
-        volume.arrays.push(Array::new(OCCLUSION, 1, values));
+        let is_new = |name: &str| arrays.iter().any(|array| array.name == name);
+        let replaced = volume.array(Aov::AmbientOcclusion.name()).is_some_and(|array| is_new(&array.name));
+        volume.arrays.retain(|array| !is_new(&array.name));
+        volume.arrays.extend(arrays);
         let mut field_data = vec![
             ("program".to_owned(), PROGRAM.to_owned()),
             (PIPELINE.to_owned(), told.to_owned()),
@@ -330,6 +460,18 @@ impl ShadePlan {
         let file = AtomicFile::create(path)?;
         vti::write(file, &volume, &settings).map_err(AtomicFile::name_in(path))?.commit()
     }
+}
+
+/// The colour of a point, each number from 0 to 1; one number is a grey.
+fn color(array: &Array, point: usize) -> [f32; 3] {
+    let scale = if array.values.kind() == Kind::U8 { 255.0 } else { 1.0 };
+    let count = array.components;
+    let number = |c: usize| {
+        let value = array.values.get(count * point + if count < 3 { 0 } else { c }) / scale;
+        // Also what is no number.
+        if value > 0.0 { value.min(1.0) as f32 } else { 0.0 }
+    };
+    [number(0), number(1), number(2)]
 }
 
 /// The camera that an image of `ao4d run` tells; what is wrong with it otherwise. None if it tells none.

@@ -6,11 +6,12 @@
 use std::sync::Arc;
 
 use super::lighting::{LightAsked, LightingPlan};
-use super::occlusion::OcclusionPlan;
-use super::{Ref, Run, SceneRun, StageError};
-use crate::geometry::Vector64;
+use super::occlusion::{OcclusionPlan, OcclusionSource};
+use super::{Ref, Run, SceneRun, StageError, write};
+use crate::geometry::{Vector, Vector64};
 use crate::occlusion::{Directional, Estimator};
 use crate::render::{Skylight, radiosity};
+use crate::trace::ShadingPoint;
 
 impl<const D: usize> SceneRun<D> {
     /// The occlusion of all vertices with directions.
@@ -28,6 +29,51 @@ impl<const D: usize> SceneRun<D> {
         Ok(found)
     }
 
+    /// The vectors b at a mesh's vertices, for a file of it: of all, or of those that a piece of a run shows; elsewhere they
+    /// are zero.
+    ///
+    /// # Errors
+    /// As [`SceneRun::directions`].
+    pub(super) fn directions_of_mesh(
+        &mut self,
+        of: Ref<OcclusionPlan>,
+        run: &Run,
+    ) -> Result<Vec<Vector<D>>, StageError> {
+        let mesh = Arc::clone(self.session.mesh());
+        let computed = matches!(run.plan[of].source, OcclusionSource::Compute(_));
+        if let Some(joined) = run.joined.as_ref().filter(|_| computed) {
+            let found = joined.values(of.nth(), mesh.vertices.len())?.vectors;
+            return Ok(found.chunks_exact(D).map(Vector::from_column_slice).collect());
+        }
+        let Some(piece) = run.plan.piece else { return Ok(self.directions(of, run)?.vectors.clone()) };
+        let own = piece.share(mesh.vertices.len());
+        let simplices = mesh.simplices.iter().filter(|simplex| write::has_first(&own, simplex));
+        let mut shown: Vec<usize> = simplices.flatten().map(|&v| v as usize).collect();
+        shown.sort_unstable();
+        shown.dedup();
+        let mut all = vec![Vector::zeros(); mesh.vertices.len()];
+        for (&v, found) in shown.iter().zip(self.vectors_at(of, shown.clone(), run)?) {
+            all[v] = found;
+        }
+        Ok(all)
+    }
+
+    /// The vectors b at these vertices.
+    ///
+    /// # Errors
+    /// As [`SceneRun::directions`].
+    pub(super) fn vectors_at(
+        &self,
+        of: Ref<OcclusionPlan>,
+        vertices: Vec<usize>,
+        run: &Run,
+    ) -> Result<Vec<Vector<D>>, StageError> {
+        let _running = run.progress.stage(&format!("directions of {}", run.plan.id(of)), vertices.len() as u64);
+        let points: Vec<ShadingPoint<D>> = vertices.into_iter().map(|v| ShadingPoint::Vertex(v as u32)).collect();
+        let backend = self.session.backend()?;
+        Ok(estimator(of, run).directional(&**backend, &points, None, run.progress)?.vectors)
+    }
+
     /// The light that a picture with this occlusion needs; none if that of an even sky will do.
     ///
     /// # Errors
@@ -43,7 +89,10 @@ impl<const D: usize> SceneRun<D> {
         }
         let gradient = asked.lighting.map_or_else(Vector64::zeros, LightingPlan::gradient);
         let mut light = Skylight::new(gradient);
-        let Some(of) = occlusion else { return Ok(Some(Arc::new(light))) };
+        let Some(of) = occlusion else {
+            light.in_image = Some(asked.bounce);
+            return Ok(Some(Arc::new(light)));
+        };
         if asked.at_voxels && !asked.bounce {
             return Ok(Some(Arc::new(light)));
         }
@@ -113,20 +162,6 @@ mod tests {
                 ),
                 "stages[3].write.arrays[1]: render `r` follows no light from surface to surface; give it `bounce: 1`",
             ),
-            (
-                "  - render: {occlusion: screen_space, dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}}\n"
-                    .to_owned(),
-                "stages[1].render.sky: `screen_space` tells how much of the sky is hidden, not where it is open; take the \
-                 occlusion of an `occlusion` stage",
-            ),
-            (
-                format!(
-                    "{sobol}  - render: {{occlusion: screen_space, dimensions: [1, 1, 1]}}\n  - animate: {{frames: 2, scan: [0, 1], vti: \
-                     a.vti, arrays: [bent_normal]}}\n"
-                ),
-                "stages[3].animate.arrays[0]: `screen_space` tells how much of the sky is hidden, not where it is open; take \
-                 the occlusion of an `occlusion` stage",
-            ),
         ] {
             assert_eq!(told(&stages).unwrap_err(), expected);
         }
@@ -143,6 +178,7 @@ mod tests {
         }
         for stages in [
             "  - render: {dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}}\n  - write: {vti: a.vti, arrays: [bent_normal, light]}\n",
+            "  - render: {occlusion: screen_space, dimensions: [1, 1, 1], sky: {gradient: [0, 1, 0, 0]}, bounce: 1}\n  - write: {vti: a.vti, arrays: [bent_normal, bounce]}\n",
             "  - occlusion: {}\n  - render: {dimensions: [1, 1, 1], bounce: 0}\n  - write: {vti: a.vti, arrays: [irradiance]}\n",
         ] {
             assert_eq!(told(stages), Ok(()));

@@ -14,19 +14,21 @@
 //! The error of the bounce is found as that of A ([`super::Estimate`]), by the scatter of 8 to 15 groups of rays, and is at
 //! least what the error of A makes of a surface of the mean radiosity: the border of what is hidden is one for both.
 //!
-//! All this is traced ray by ray on the processor: packets and OpenCL devices tell whether something is hit, not what.
+//! Packets tell on the processor which rays escape; what the others hit is looked for ray by ray. OpenCL devices tell how many
+//! rays escape, not which.
 
 use rayon::prelude::*;
 
-use super::estimate::{Accumulator, Estimate, GAIN};
+use super::cpu::PacketTracer;
+use super::estimate::{Estimate, GAIN};
 use super::surroundings::{Met, Surroundings};
-use super::{Sampler, Sampling, Sequence, ShadingPoint};
+use super::{Sampler, Sampling, ShadingPoint};
 use crate::accel::Tracer;
-use crate::geometry::{Dimension, Vector64, normal_of, widen};
+use crate::geometry::{Dimension, Vector, Vector64, normal_of, widen};
 use crate::progress::{Cancelled, Progress};
 
-/// Rays between two looks at whether to go on.
-const RAYS_BETWEEN_LOOKS: u32 = 1 << 10;
+/// Points that a thread takes at a time.
+const BATCH: usize = 16;
 
 /// Groups of rays, at most twice as many.
 const GROUPS: usize = 8;
@@ -122,24 +124,28 @@ pub fn gather<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Vec<Gathered<D>>, Cancelled> {
     assert!(radiosity.is_none_or(|r| r.len() >= tracer.mesh().vertices.len()), "one radiosity a vertex");
-    tracer.prepare();
+    tracer.prepare_wide();
     let brightest = radiosity.into_iter().flatten().flatten().fold(0.0f32, |most, &r| most.max(r));
-    let at = |point| {
-        let found = at_point(tracer, point, sampling, radiosity.map(|r| (r, f64::from(brightest))), progress)?;
-        progress.advance(1);
-        Ok(found)
-    };
-    points.par_iter().with_max_len(16).map(at).collect()
+    let radiosity = radiosity.map(|r| (r, f64::from(brightest)));
+    let found = points.par_chunks(BATCH).map_init(PacketTracer::default, |packets, points| {
+        let at = |point| {
+            let found = at_point(packets, tracer, point, sampling, radiosity, progress)?;
+            progress.advance(1);
+            Ok(found)
+        };
+        points.iter().map(at).collect::<Result<Vec<_>, Cancelled>>()
+    });
+    Ok(found.collect::<Result<Vec<_>, Cancelled>>()?.concat())
 }
 
 fn at_point<const D: usize>(
+    packets: &mut PacketTracer<D>,
     tracer: &Tracer<D>,
     point: &ShadingPoint<D>,
     sampling: &Sampling,
     radiosity: Option<(&[[f32; 3]], f64)>,
     progress: &dyn Progress,
 ) -> Result<Gathered<D>, Cancelled> {
-    let surroundings = Surroundings::of(tracer, point);
     let nothing = Gathered {
         open: Estimate::known(1.0),
         vector: Vector64::zeros(),
@@ -148,53 +154,45 @@ fn at_point<const D: usize>(
         hits: 0,
         behind: 0,
     };
-    if surroundings.normal.amax() == 0.0 {
+    let mut found = nothing;
+    let Some((radiosity, brightest)) = radiosity else {
+        let mut watch = |direction: Vector<D>, is_open: bool| {
+            if is_open {
+                found.vector += widen(&direction);
+            }
+        };
+        found.open = packets.watched(tracer, point, sampling, &mut watch, progress)?;
+        found.vector /= f64::from(found.open.rays.max(1));
+        return Ok(found);
+    };
+    let (mesh, surroundings, mut light) = (tracer.mesh(), Surroundings::of(tracer, point), Light::new());
+    let mut watch = |direction: Vector<D>, is_open: bool| {
+        let met = if is_open { None } else { surroundings.meets(tracer, direction, sampling.max_distance) };
+        let mut sent = [0.0; 3];
+        match met {
+            None => found.vector += widen(&direction),
+            Some(Met { simplex, barycentric }) => {
+                let corners = mesh.corners(simplex).map(|v| widen(&v));
+                found.hits += 1;
+                found.behind += u32::from(normal_of(&corners).dot(&widen(&direction)) > 0.0);
+                for (&vertex, weight) in mesh.simplices[simplex as usize].iter().zip(barycentric) {
+                    (0..3).for_each(|c| sent[c] += weight * f64::from(radiosity[vertex as usize][c]));
+                }
+            }
+        }
+        light.add(sent);
+    };
+    found.open = packets.watched(tracer, point, sampling, &mut watch, progress)?;
+    let rays = found.open.rays;
+    if rays == 0 {
         return Ok(nothing);
     }
-    let (mesh, frame) = (tracer.mesh(), surroundings.frame());
-    let mut sequence = Sequence::new(sampling.sampler, sampling.seed, point.number());
-    let mut accumulator = Accumulator::new(sampling.sampler, Dimension::of::<D>());
-    let (mut found, mut light) = (nothing, Light::new());
-    while accumulator.rays() < sampling.samples && !sampling.target.is_some_and(|target| target.is_met(&accumulator)) {
-        if accumulator.rays().is_multiple_of(RAYS_BETWEEN_LOOKS) && progress.cancelled() {
-            return Err(Cancelled);
-        }
-        let direction = sequence.next_direction(&frame);
-        let is_open = match radiosity {
-            None => surroundings.is_visible(tracer, direction, sampling.max_distance),
-            Some((radiosity, _)) => match surroundings.meets(tracer, direction, sampling.max_distance) {
-                None => {
-                    light.add([0.0; 3]);
-                    true
-                }
-                Some(Met { simplex, barycentric }) => {
-                    let corners = mesh.corners(simplex).map(|v| widen(&v));
-                    found.hits += 1;
-                    found.behind += u32::from(normal_of(&corners).dot(&widen(&direction)) > 0.0);
-                    let mut sent = [0.0; 3];
-                    for (&vertex, weight) in mesh.simplices[simplex as usize].iter().zip(barycentric) {
-                        (0..3).for_each(|c| sent[c] += weight * f64::from(radiosity[vertex as usize][c]));
-                    }
-                    light.add(sent);
-                    false
-                }
-            },
-        };
-        if is_open {
-            found.vector += widen(&direction);
-        }
-        accumulator.add(u64::from(is_open), 1);
-    }
-    found.open = accumulator.estimate();
-    let rays = accumulator.rays();
     found.vector /= f64::from(rays);
-    if let Some((_, brightest)) = radiosity {
-        found.bounced = light.sum.map(|c| c / f64::from(rays));
-        let even_in = (sampling.sampler == Sampler::Sobol).then_some(Dimension::of::<D>());
-        let most = light.sum.into_iter().fold(0.0, f64::max);
-        let mean = if found.hits > 0 { most / f64::from(found.hits) } else { brightest };
-        found.bounced_error = light.error(rays, even_in).max(mean * f64::from(found.open.error));
-    }
+    found.bounced = light.sum.map(|c| c / f64::from(rays));
+    let even_in = (sampling.sampler == Sampler::Sobol).then_some(Dimension::of::<D>());
+    let most = light.sum.into_iter().fold(0.0, f64::max);
+    let mean = if found.hits > 0 { most / f64::from(found.hits) } else { brightest };
+    found.bounced_error = light.error(rays, even_in).max(mean * f64::from(found.open.error));
     Ok(found)
 }
 

@@ -102,6 +102,14 @@ macro_rules! numbers {
                 }
             }
 
+            /// Puts all numbers of another list behind these. Numbers of another type are left where they are.
+            pub fn append(&mut self, more: &Values) {
+                match (self, more) {
+                    $((Values::$kind(all), Values::$kind(more)) => all.extend_from_slice(more),)+
+                    _ => {}
+                }
+            }
+
             /// Appends the numbers from `range` as little-endian bytes.
             ///
             /// # Panics

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Cone, Expansion, Ray, Vector, Vector64, normal_of, widen};
-use ao4d::mesh::{Crease, Mesh, MeshBuilder, Orientation, Surface};
+use ao4d::mesh::{Crease, Gloss, Mesh, MeshBuilder, Orientation, Surface};
 use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
 use ao4d::render::filters::denoise::Refine;
@@ -362,6 +362,16 @@ fn lit_floor<const D: usize>(projection: Projection) {
     }
     assert!(shadowed.into_iter().chain(lit).min() > Some(30), "{shadowed:?} {lit:?}");
     assert!(renderer.lighting.as_ref().unwrap().in_vain().is_empty());
+
+    // What objects say of their highlights counts instead of what the picture says.
+    let mut mesh = (**renderer.tracer().mesh()).clone();
+    let gloss = Gloss { specular: Some(0.3), shininess: Some(12.0) };
+    mesh.objects.iter_mut().for_each(|object| object.gloss = gloss);
+    renderer.backend = Arc::new(CpuBackend::new(Tracer::new(mesh)));
+    let mut dull = two_lights::<D>();
+    (dull.specular, dull.shininess) = (0.0, 100.0);
+    renderer.lighting = Some(dull);
+    assert_eq!(renderer.volume(&[Aov::Light], &Silent).unwrap().arrays[0].values, arrays[0].values);
 
     // A light in the box reaches nothing, and what is seen is as without it.
     let inside =

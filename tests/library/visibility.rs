@@ -417,6 +417,9 @@ fn the_cheaper_way_is_chosen() {
     };
     let sphere = mesh(&object::<4>(json!({"hypersphere": {"radius": 1.0, "subdivisions": 6}})));
     assert_eq!(pick(&sphere, 3.0, [64, 64, 64]), Method::Rasterize);
+    // An eye among many small ones, some of which reach behind it.
+    let fine = mesh(&object::<4>(json!({"hypersphere": {"radius": 1.0, "subdivisions": 10}})));
+    assert_eq!(pick(&fine, 0.3, [96, 96, 96]), Method::Rasterize);
     // Two thousand tetrahedra all around, each of which covers much.
     let soup = mesh(&Random(1).soup::<4>(2000, 2.0, false));
     assert_eq!(pick(&soup, 0.3, [16, 16, 16]), Method::RayCast);

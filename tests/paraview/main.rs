@@ -6,5 +6,7 @@ mod smaller;
 mod images_by_others;
 mod paraview_run;
 mod paraview_state;
+mod pieces;
 mod pipelines;
+mod plugin;
 mod vtk_files;

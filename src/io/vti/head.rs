@@ -45,19 +45,16 @@ pub(super) fn pad(head: &mut String) {
 
 /// The head in front of the arrays; `scalars` is the array that ParaView shows first.
 pub(super) fn before_arrays(grid: &Grid, settings: &Settings, scalars: Option<&ArraySpec>) -> String {
-    let [x, y, z] = grid.dimensions.map(|n| n - 1);
     let compressor = match settings.compression {
         Compression::None => "",
         Compression::Zlib => " compressor=\"vtkZLibDataCompressor\"",
         Compression::Lz4 => " compressor=\"vtkLZ4DataCompressor\"",
     };
-    // The shortest text that reads back as the same f64.
-    let triple = |v: [f64; 3]| format!("{:?} {:?} {:?}", v[0], v[1], v[2]);
-    let (origin, spacing) = (triple(grid.origin), triple(grid.spacing));
+    let (extent, place) = (extent(grid, settings.first_layer), place(grid));
     let mut head = format!(
         r#"<?xml version="1.0"?>
 <VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64"{compressor}>
-  <ImageData WholeExtent="0 {x} 0 {y} 0 {z}" Origin="{origin}" Spacing="{spacing}" Direction="1 0 0 0 1 0 0 0 1">
+  <ImageData WholeExtent="{extent}" {place}>
 "#
     );
     if settings.time.is_some() || !settings.field_data.is_empty() || !settings.numbers.is_empty() {
@@ -79,8 +76,22 @@ pub(super) fn before_arrays(grid: &Grid, settings: &Settings, scalars: Option<&A
         head.push_str("    </FieldData>\n");
     }
     let scalars = scalars.map_or(String::new(), |a| format!(" Scalars=\"{}\"", escape(&a.name)));
-    let _ = write!(head, "    <Piece Extent=\"0 {x} 0 {y} 0 {z}\">\n      <PointData{scalars}>\n");
+    let _ = write!(head, "    <Piece Extent=\"{extent}\">\n      <PointData{scalars}>\n");
     head
+}
+
+/// The first and last point along each axis, of layers from this one on.
+pub(in crate::io) fn extent(grid: &Grid, first_layer: usize) -> String {
+    let [x, y, z] = grid.dimensions.map(|n| n - 1);
+    format!("0 {x} 0 {y} {first_layer} {}", first_layer + z)
+}
+
+/// Where an image lies.
+pub(in crate::io) fn place(grid: &Grid) -> String {
+    // The shortest text that reads back as the same f64.
+    let triple = |v: [f64; 3]| format!("{:?} {:?} {:?}", v[0], v[1], v[2]);
+    let (origin, spacing) = (triple(grid.origin), triple(grid.spacing));
+    format!("Origin=\"{origin}\" Spacing=\"{spacing}\" Direction=\"1 0 0 0 1 0 0 0 1\"")
 }
 
 /// A number as text that is as long for every number, so that it can be written over.
@@ -89,7 +100,7 @@ fn fixed_width(number: f64) -> String {
 }
 
 /// What every `<DataArray>` says, wherever its bytes are.
-pub(super) fn attributes(array: &ArraySpec) -> String {
+pub(in crate::io) fn attributes(array: &ArraySpec) -> String {
     let (kind, name, components) = (array.kind.vtk_name(), escape(&array.name), array.components.len());
     let mut text = format!("type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"");
     if components > 1 {

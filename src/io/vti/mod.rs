@@ -9,7 +9,7 @@
 //! before, so arrays are kept aside, in memory and beyond a limit in nameless temporary files, until
 //! [`VtiWriter::finish`].
 
-mod head;
+pub(in crate::io) mod head;
 mod spool;
 
 use std::io::{BufRead, Seek, SeekFrom, Write};
@@ -66,6 +66,8 @@ pub struct Settings {
     pub time: Option<f64>,
     /// The folder for temporary files, best on the disk of the file itself; the system's own otherwise.
     pub scratch: Option<PathBuf>,
+    /// Of a part of an image: which of the image's layers is the first here. The grid is the part's, its origin the image's.
+    pub first_layer: usize,
 }
 
 /// An array that is going to be written.

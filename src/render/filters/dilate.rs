@@ -166,7 +166,7 @@ mod tests {
     fn one_voxel(thickness: usize) -> GBuffer<4> {
         let dimensions = [9, 9, 9];
         let filters: Vec<Box<dyn ImageFilter<4>>> = vec![Box::new(Dilate { layers: 3 })];
-        let mut chain = Chain::new(dimensions, COLUMNS, &filters);
+        let mut chain = Chain::new(dimensions, 0, COLUMNS, &filters);
         let mut whole = GBuffer::new(dimensions, 0..0, COLUMNS);
         for first in (0..9).step_by(thickness) {
             let mut source = |layers: std::ops::Range<usize>| {

@@ -49,10 +49,16 @@ pub(super) struct Chain<'f, const D: usize> {
 pub(super) type Source<'s, const D: usize> = dyn FnMut(Range<usize>) -> Result<GBuffer<D>, Error> + 's;
 
 impl<'f, const D: usize> Chain<'f, D> {
-    /// A chain that has made nothing yet, of an image whose layers come with these columns.
-    pub fn new(dimensions: [usize; 3], columns: Columns, filters: &'f [Box<dyn ImageFilter<D>>]) -> Self {
-        let windows = filters.iter().map(|_| GBuffer::new(dimensions, 0..0, columns)).collect();
-        Self { dimensions, filters, windows, made: vec![0; filters.len() + 1] }
+    /// A chain that has made nothing yet, of an image whose layers come with these columns; its first layer is to be `first`.
+    pub fn new(dimensions: [usize; 3], first: usize, columns: Columns, filters: &'f [Box<dyn ImageFilter<D>>]) -> Self {
+        // What comes before a filter begins earlier, by what the filter looks back at.
+        let mut made = vec![first; filters.len() + 1];
+        for (stage, filter) in filters.iter().enumerate().rev() {
+            made[stage] = made[stage + 1].saturating_sub(filter.halo());
+        }
+        let windows =
+            made[..filters.len()].iter().map(|&first| GBuffer::new(dimensions, first..first, columns)).collect();
+        Self { dimensions, filters, windows, made }
     }
 
     /// The layers up to `end` that have not been made yet, filtered.
@@ -88,9 +94,14 @@ impl<'f, const D: usize> Chain<'f, D> {
     }
 }
 
+/// How many layers are made before and after those that are wanted, for the filters to look at.
+pub fn reach<const D: usize>(filters: &[Box<dyn ImageFilter<D>>]) -> usize {
+    filters.iter().map(|filter| filter.halo()).sum()
+}
+
 /// Layers that the filters hold beside those of a slab.
 pub(super) fn halo<const D: usize>(filters: &[Box<dyn ImageFilter<D>>]) -> usize {
-    filters.iter().map(|filter| 2 * filter.halo()).sum()
+    2 * reach(filters)
 }
 
 #[cfg(test)]
@@ -126,14 +137,14 @@ mod tests {
     }
 
     #[test]
-    fn slabs_of_any_thickness_give_the_same_and_make_each_layer_once() {
+    fn slabs_and_parts_of_any_thickness_give_the_same_and_make_each_layer_once() {
         let dimensions = [2, 1, 11];
         let filters: Vec<Box<dyn ImageFilter<4>>> = vec![Box::new(Mean(2)), Box::new(Mean(0)), Box::new(Mean(3))];
-        let image = |thickness: usize| {
+        let image = |range: Range<usize>, thickness: usize| {
             let mut asked = Vec::new();
-            let mut chain = Chain::new(dimensions, Columns::DEPTH, &filters);
+            let mut chain = Chain::new(dimensions, range.start, Columns::DEPTH, &filters);
             let mut depth = Vec::new();
-            for first in (0..11).step_by(thickness) {
+            for first in range.clone().step_by(thickness) {
                 let mut source = |layers: Range<usize>| {
                     asked.extend(layers.clone());
                     let mut buffer = GBuffer::new(dimensions, layers.clone(), Columns::DEPTH);
@@ -143,15 +154,25 @@ mod tests {
                     });
                     Ok(buffer)
                 };
-                depth.extend(chain.next(11.min(first + thickness), &mut source, &Silent).unwrap().depth);
+                depth.extend(chain.next(range.end.min(first + thickness), &mut source, &Silent).unwrap().depth);
             }
-            assert_eq!(asked, (0..11).collect::<Vec<_>>());
+            let needed = range.start.saturating_sub(5)..11.min(range.end + 5);
+            assert_eq!(asked, needed.collect::<Vec<_>>(), "each layer once, and no more than are looked at");
             depth
         };
-        let whole = image(11);
+        let whole = image(0..11, 11);
         assert_eq!(whole.len(), 22);
         for thickness in [1, 2, 3, 7] {
-            assert_eq!(image(thickness), whole, "{thickness}");
+            assert_eq!(image(0..11, thickness), whole, "{thickness}");
+            for first in 0..11 {
+                for end in first + 1..12 {
+                    assert_eq!(
+                        image(first..end, thickness),
+                        whole[2 * first..2 * end],
+                        "{first}..{end} by {thickness}"
+                    );
+                }
+            }
         }
     }
 }

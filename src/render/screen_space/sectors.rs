@@ -21,7 +21,7 @@
 use crate::geometry::Dimension;
 
 /// Sectors of a slice: the bits of a word.
-const SECTORS: f32 = u64::BITS as f32;
+pub(super) const SECTORS: usize = u64::BITS as usize;
 
 /// A side of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +59,11 @@ impl<const D: usize> Slice<D> {
         Some(Self { cos, sin, behind, total, weight: length * total })
     }
 
+    /// Cosine and sine of g.
+    pub fn angle(&self) -> [f32; 2] {
+        [self.cos, self.sin]
+    }
+
     /// The integral from 0 to h, by the cosines and sines of h and g; the sine of g comes before its cosine.
     #[inline]
     fn integral(cos_h: f32, sin_h: f32, sin_g: f32, cos_g: f32) -> f32 {
@@ -93,7 +98,7 @@ impl<const D: usize> Slice<D> {
 
 /// The arc cosine to 7e-5 (Abramowitz and Stegun 4.4.45): a six-hundredth of a sector.
 #[inline]
-fn arc_cosine(x: f32) -> f32 {
+pub(super) fn arc_cosine(x: f32) -> f32 {
     let y = x.abs().min(1.0);
     let near = (1.0 - y).sqrt() * (1.570_728_8 + y * (-0.212_114_4 + y * (0.074_261 - y * 0.018_729_3)));
     if x < 0.0 { std::f32::consts::PI - near } else { near }
@@ -106,19 +111,28 @@ pub(super) struct Hidden(u64);
 impl Hidden {
     /// Hides what lies between two shares of the weight, in either order. A sector that is hidden in part counts as hidden
     /// with the probability of that part, where `dither` is an even random number from 0 up to 1, the same for a whole
-    /// slice.
+    /// slice. Returns the share of the weight that was open before.
     #[inline]
-    pub fn hide(&mut self, one: f32, other: f32, dither: f32) {
-        let place = |share: f32| ((share * SECTORS + dither) as u32).min(u64::BITS);
+    pub fn hide(&mut self, one: f32, other: f32, dither: f32) -> f32 {
+        let place = |share: f32| ((share * SECTORS as f32 + dither) as u32).min(u64::BITS);
         let (first, end) = (place(one.min(other)), place(one.max(other)));
-        if first < end {
-            self.0 |= (u64::MAX >> (u64::BITS - (end - first))) << first;
+        if first >= end {
+            return 0.0;
         }
+        let sectors = (u64::MAX >> (u64::BITS - (end - first))) << first;
+        let new = sectors & !self.0;
+        self.0 |= sectors;
+        new.count_ones() as f32 / SECTORS as f32
+    }
+
+    /// The hidden sectors, the first from the end on the side of -w lowest.
+    pub fn sectors(self) -> u64 {
+        self.0
     }
 
     /// The share of the weight that is open.
     pub fn open(self) -> f32 {
-        self.0.count_zeros() as f32 / SECTORS
+        self.0.count_zeros() as f32 / SECTORS as f32
     }
 }
 
@@ -160,8 +174,9 @@ mod tests {
     fn what_is_hidden_twice_counts_once() {
         let mut hidden = Hidden::default();
         assert_eq!(hidden.open(), 1.0);
-        hidden.hide(0.25, 0.5, 0.5);
-        hidden.hide(0.5, 0.375, 0.5);
+        assert_eq!(hidden.hide(0.25, 0.5, 0.5), 0.25);
+        assert_eq!(hidden.hide(0.5, 0.375, 0.5), 0.0);
+        assert_eq!(hidden.hide(0.25, 0.25, 0.5), 0.0);
         assert_eq!(hidden.open(), 0.75);
         // Less than a sector is hidden by the dither alone.
         for (dither, open) in [(0.0, 0.75), (0.5, 0.75), (0.95, 0.734375)] {

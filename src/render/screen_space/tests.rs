@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::geometry::Vector64;
 use crate::mesh::{MeshBuilder, Orientation, Surface};
+use crate::occlusion::Error;
 use crate::occlusion::Estimator;
 use crate::progress::Silent;
-use crate::render::{Aov, Projection, Renderer, Shading, View};
+use crate::render::{Aov, Projection, Renderer, Shading, Skylight, View, radiosity};
 use crate::trace::Sampling;
 use crate::trace::cpu::CpuBackend;
 use crate::volume::Values;
@@ -38,6 +40,12 @@ fn image<const D: usize>(
         }
     };
     DepthImage::new(&camera, &grid, (0..grid.len()).map(distance).collect(), settings)
+}
+
+impl<const D: usize> DepthImage<D> {
+    fn occlusion_at(&self, normal: &Vector<D>, index: [usize; 3]) -> Option<f32> {
+        self.seen_at(normal, index).map(|seen| seen.open)
+    }
 }
 
 /// The normal of a surface that steps back by so much for each unit to the right and up.
@@ -127,6 +135,50 @@ fn what_has_no_depth_or_no_normal_is_told() {
     assert_eq!((empty.thickness(), empty.shows(3)), (0.0, false));
 }
 
+/// What the image says of the middle of a plane, and beside a corner whose walls send light of 0.5.
+fn directions<const D: usize>(across: usize) {
+    let close = |a: &Vector<D>, b: &Vector<D>, most: f32| assert!((a - b).norm() < most, "{D}D: {a} for {b}");
+    let open = |normal: &Vector<D>| narrow(&open_vector(&widen(normal)));
+    let layer = |k: usize| if D == 4 { k } else { 0 };
+    for projection in [PERSPECTIVE, PARALLEL] {
+        let plane = image::<D>(projection, across, ScreenSpace::default(), |_, _| [2.0, 0.5, -0.3]).directed();
+        let leaning = normal::<D>(0.5, -0.3);
+        let seen = plane.seen_at(&leaning, [across / 3, across / 2, layer(across / 4)]).unwrap();
+        close(&seen.vector, &open(&leaning.normalize()), 0.03);
+        assert_eq!(seen.bounced, [0.0; 3]);
+        let settings = ScreenSpace { thickness: Thickness::Given(f32::INFINITY), ..ScreenSpace::default() };
+        let corner = image::<D>(projection, across, settings, |x, _| [2.0, -x.signum(), 0.0]).directed();
+        let voxels = corner.ahead.len();
+        let corner = corner.lit(
+            (0..voxels)
+                .map(|n| ([0.5, 0.25, 0.0], normal(if 2 * (n % across) < across { 1.0 } else { -1.0 }, 0.0)))
+                .collect(),
+        );
+        let (middle, mut sum, mut light) = (across / 2, Vector::<D>::zeros(), 0.0);
+        let places = (0..16).map(|n| [middle, middle - 2 + n % 4, layer(middle - 2 + n / 4)]);
+        for index in places {
+            let seen = corner.seen_at(&normal(-1.0, 0.0), index).unwrap();
+            sum += seen.vector / 16.0;
+            light += seen.bounced[0] / 16.0;
+            // All that is hidden is hidden by what sends this light.
+            assert!((seen.bounced[0] - 0.5 * (1.0 - seen.open)).abs() < 1e-5 && seen.bounced[2] == 0.0);
+            assert!((seen.bounced[1] - 0.5 * seen.bounced[0]).abs() < 1e-6);
+        }
+        assert!((light - 0.25).abs() < 0.02, "{light}");
+        // Half of b along the own normal, and as much along the other wall's as a half-space of the directions has:
+        // c_D times the integral of x z over a quarter of the ball.
+        let (own, other) = (normal::<D>(-1.0, 0.0).normalize(), normal::<D>(1.0, 0.0).normalize());
+        let along = if D == 3 { 2.0 / (3.0 * std::f32::consts::PI) } else { 3.0 / 16.0 };
+        close(&sum, &(open(&own) * 0.5 + other * along), 0.03);
+    }
+}
+
+#[test]
+fn open_directions_and_light_of_planes_and_right_angles() {
+    directions::<3>(200);
+    directions::<4>(60);
+}
+
 /// A box of simplices: the Kuhn triangulation of each face.
 fn cuboid<const D: usize>(min: [f64; 4], max: [f64; 4]) -> Surface<D> {
     let spec: crate::scene::ObjectSpec = serde_json::from_value(
@@ -143,6 +195,11 @@ fn ends<const D: usize>(numbers: [f64; 4]) -> Vec<f64> {
 
 /// A box before a wall, seen from in front; its picture by rays, and in screen space by slabs of this thickness.
 fn picture<const D: usize>(shading: Shading, across: usize, slab: usize) -> Vec<f32> {
+    arrays::<D>(shading, across, slab, &[Aov::AmbientOcclusion]).remove(0)
+}
+
+/// The same, under a sky, with these arrays.
+fn arrays<const D: usize>(shading: Shading, across: usize, slab: usize, aovs: &[Aov]) -> Vec<Vec<f32>> {
     let mut builder = MeshBuilder::<D>::new();
     for (name, surface) in [
         ("wall", cuboid([-2.0, -2.0, -2.0, -1.4], [2.0, 2.0, 2.0, -1.0])),
@@ -154,15 +211,53 @@ fn picture<const D: usize>(shading: Shading, across: usize, slab: usize) -> Vec<
     let camera =
         Camera::new(&View { eye: Vector64::from_fn(|r, _| ends::<D>([0.3, 0.2, 0.1, 1.0])[r]), ..View::default() });
     let dimensions = [across, across, if D == 4 { across } else { 1 }];
-    let renderer = Renderer::new(backend, camera.unwrap(), dimensions, shading);
-    let mut found = Vec::new();
+    let mut renderer = Renderer::new(backend, camera.unwrap(), dimensions, shading);
+    let gradient = Vector64::from_fn(|r, _| [0.3, 0.5, 0.0, 0.2][if r == D - 1 { 3 } else { r }]);
+    let mut skylight = Skylight::new(gradient);
+    match renderer.shading {
+        Shading::Voxel(estimator) => {
+            let points = crate::trace::ShadingPoint::vertices(renderer.tracer().mesh());
+            let found = estimator.directional(&*renderer.backend, &points, None, &Silent).unwrap();
+            skylight.radiosity = Some(Arc::new(radiosity(renderer.tracer().mesh(), &found, &gradient)));
+        }
+        _ => skylight.in_image = Some(true),
+    }
+    renderer.skylight = Some(Arc::new(skylight));
+    let mut found = vec![Vec::new(); aovs.len()];
     let sink = |made: crate::render::Slab| {
-        let Values::F32(values) = &made.arrays[0].values else { panic!("not f32") };
-        found.extend_from_slice(values);
+        for (found, array) in found.iter_mut().zip(&made.arrays) {
+            let Values::F32(values) = &array.values else { panic!("not f32") };
+            found.extend_from_slice(values);
+        }
         Ok::<(), Error>(())
     };
-    renderer.render(&[Aov::AmbientOcclusion], Some(slab), &Silent, sink).unwrap();
+    renderer.render(aovs, Some(slab), &Silent, sink).unwrap();
     found
+}
+
+/// Where the sky is open and what light comes from other surfaces, against rays: the root mean square of what each is off, and
+/// of what each is. All light here comes from the box's sides, of which the image shows little.
+fn rays_agree_on_light<const D: usize>(across: usize, most: [f64; 2]) {
+    let aovs = [Aov::BentNormal, Aov::Bounce, Aov::Irradiance];
+    let rays = arrays::<D>(Shading::Voxel(Estimator::Sampled(Sampling::new(128, 1))), across, across, &aovs);
+    let settings = ScreenSpace { thickness: Thickness::Given(0.4), ..ScreenSpace::default() };
+    let space = arrays::<D>(Shading::ScreenSpace(settings), across, across, &aovs);
+    let rms = |values: &mut dyn Iterator<Item = f32>, count: usize| {
+        (values.map(|x| f64::from(x).powi(2)).sum::<f64>() / count as f64).sqrt()
+    };
+    for (a, (name, most)) in ["b", "bounce"].into_iter().zip(most).enumerate() {
+        let off = rms(&mut rays[a].iter().zip(&space[a]).map(|(a, b)| a - b), rays[a].len());
+        let size = rms(&mut rays[a].iter().copied(), rays[a].len());
+        println!("{D}D, {name}: {off} of {size}");
+        assert!(off < most && off < 0.7 * size, "{D}D, {name}: {off} of {size}");
+    }
+    assert_eq!(arrays::<D>(Shading::ScreenSpace(settings), across, 3, &aovs), space, "slabs");
+}
+
+#[test]
+fn screen_space_sees_the_light_that_rays_see() {
+    rays_agree_on_light::<3>(40, [0.01, 0.025]);
+    rays_agree_on_light::<4>(16, [0.02, 0.025]);
 }
 
 fn rays_agree<const D: usize>(across: usize, most: f64) {

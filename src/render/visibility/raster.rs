@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::NOTHING;
 use super::footprint::Footprint;
 use crate::accel::Tracer;
-use crate::geometry::{Dimension, Vector};
+use crate::geometry::{Dimension, Vector, widen};
 use crate::mesh::Mesh;
 use crate::progress::{Cancelled, Progress};
 use crate::render::camera::{Camera, Lens};
@@ -46,6 +46,8 @@ impl Box3 {
 #[derive(Clone, Debug)]
 pub(super) struct Raster {
     boxes: Vec<Box3>,
+    /// Which simplices reach behind the eye, so that their images have no end.
+    endless: Vec<bool>,
 }
 
 /// Finds the box of each simplex.
@@ -59,8 +61,17 @@ struct Framer<'a, const D: usize> {
     parallel: bool,
 }
 
+/// A corner as the camera sees it: its parts along the image's axes and ahead of the eye, and how far off it is by the sum over
+/// the axes.
+struct Corner {
+    across: [f64; 3],
+    ahead: f64,
+    offset: f64,
+}
+
 impl<const D: usize> Framer<'_, D> {
-    fn frame(&self, corners: &[Vector<D>; D]) -> Box3 {
+    /// The box of a simplex, and whether the simplex reaches behind the eye.
+    fn frame(&self, corners: &[Vector<D>; D]) -> (Box3, bool) {
         let whole = Box3 { first: [0; 3], last: self.grid.dimensions.map(|n| (n - 1) as u16) };
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let (mut before, mut behind) = (0, 0);
@@ -84,15 +95,53 @@ impl<const D: usize> Framer<'_, D> {
         if !self.parallel {
             // So wide an angle that rounded rays may go anywhere.
             if self.reach > 1e5 {
-                return whole;
+                return (whole, true);
             }
             if behind == D {
-                return Box3::EMPTY;
+                return (Box3::EMPTY, false);
+            }
+            if before == 0 {
+                return (whole, true);
             }
             if before < D {
-                return whole;
+                self.extend(corners, &mut low, &mut high);
             }
         }
+        (self.around(&low, &high, margin), !self.parallel && before < D)
+    }
+
+    /// Extends the box of the corners before the eye to where the edges to the others go: without end, to the sides where they
+    /// pass the eye.
+    fn extend(&self, corners: &[Vector<D>; D], low: &mut [f64; 3], high: &mut [f64; 3]) {
+        let corner = |v: &Vector<D>| {
+            let parts = self.camera.to_frame(&(widen(v) - self.camera.eye()));
+            let across = std::array::from_fn(|a| if a < D - 1 { parts[a] } else { 0.0 });
+            Corner { across, ahead: -parts[D - 1], offset: self.camera.offset(v) }
+        };
+        let corners: [Corner; D] = std::array::from_fn(|i| corner(&corners[i]));
+        let is_before = |c: &&Corner| c.ahead > 1e-6 * c.offset;
+        for one in corners.iter().filter(is_before) {
+            for other in corners.iter().filter(|c| !is_before(c)) {
+                let part = one.ahead / (one.ahead - other.ahead);
+                // What is far beside the other loses its digits.
+                let is_clear = other.offset < 1e3 * one.offset;
+                for a in 0..D - 1 {
+                    let passes = one.across[a] + part * (other.across[a] - one.across[a]);
+                    let rounding = 1e-4 * (one.offset + other.offset);
+                    if !(is_clear && passes > rounding) {
+                        low[a] = f64::NEG_INFINITY;
+                    }
+                    if !(is_clear && passes < -rounding) {
+                        high[a] = f64::INFINITY;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The voxels between these ends, and what rounding adds to them.
+    fn around(&self, low: &[f64; 3], high: &[f64; 3], margin: f64) -> Box3 {
+        let whole = Box3 { first: [0; 3], last: self.grid.dimensions.map(|n| (n - 1) as u16) };
         let mut found = whole;
         for a in 0..D - 1 {
             let middle = 0.5 * (self.grid.dimensions[a] - 1) as f64;
@@ -121,23 +170,34 @@ impl Raster {
             parallel: camera.is_parallel(),
         };
         let count = mesh.simplices.len() as u32;
-        let mut boxes: Vec<Box3> =
-            (0..count).into_par_iter().with_min_len(1024).map(|s| framer.frame(&mesh.corners(s))).collect();
+        let frame = |s: u32| framer.frame(&mesh.corners(s));
+        let (mut boxes, endless): (Vec<Box3>, Vec<bool>) =
+            (0..count).into_par_iter().with_min_len(1024).map(frame).unzip();
         // What lies on an earlier one is never seen first.
         let copies = mesh.copies.iter().map(|(copy, _)| copy);
         mesh.degenerate.iter().copied().chain(copies).for_each(|s| boxes[s as usize] = Box3::EMPTY);
-        Self { boxes }
+        Self { boxes, endless }
     }
 
     /// Whether it promises to be faster than a ray for each voxel, and a hierarchy if there is none yet. The costs are
     /// nanoseconds on one machine; what counts is their ratio.
     pub fn is_cheaper<const D: usize>(&self, grid: &Grid, prepared: bool) -> bool {
         let filled = 1.0 / f64::from(Dimension::of::<D>().simplices_a_cube());
-        let convert = |b: &Box3| {
-            let rows = b.count(1) * b.count(2);
-            if b.is_empty() { 0.0 } else { 300.0 + rows * (15.0 + 3.0 * filled * b.count(0)) }
-        };
-        let raster: f64 = self.boxes.iter().map(convert).sum();
+        let cover = |b: &Box3| b.count(1) * b.count(2) * (15.0 + 3.0 * filled * b.count(0));
+        let (mut raster, mut endless) = (0.0, 0.0);
+        for (b, &is_endless) in self.boxes.iter().zip(&self.endless).filter(|(b, _)| !b.is_empty()) {
+            raster += 300.0;
+            if is_endless {
+                // Its rows are found layer by layer.
+                raster += 30.0 * b.count(2);
+                endless += cover(b);
+            } else {
+                raster += cover(b);
+            }
+        }
+        // Boxes without end say little: but together they cover no voxel much more often than its ray passes surfaces.
+        let whole = Box3 { first: [0; 3], last: grid.dimensions.map(|n| (n - 1) as u16) };
+        raster += endless.min(PASSES * cover(&whole));
         let depth = (self.boxes.len() as f64).max(2.0).log2();
         let build = if prepared { 0.0 } else { 400.0 * self.boxes.len() as f64 };
         raster < grid.len() as f64 * (50.0 + 60.0 * depth) + build
@@ -188,6 +248,9 @@ impl Raster {
         Ok(visible)
     }
 }
+
+/// How often a ray passes surfaces, at most, where nothing tells.
+const PASSES: f64 = 16.0;
 
 /// Rows of a tile: some tiles for each thread, so that none waits for long; but a layer's worth, so that few simplices are in
 /// several.

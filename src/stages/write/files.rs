@@ -1,12 +1,14 @@
 //! The open files of one picture: each slab goes to all of them.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use super::{Content, Format, Opening, VoxelFile, WritePlan};
 use crate::io::Error;
 use crate::render::{Accuracy, Aov};
 use crate::stages::render::RenderPlan;
-use crate::stages::{Plan, Ref};
+use crate::stages::{Plan, Ref, Run};
 use crate::volume::{Array, Grid};
 
 /// The open files of one picture.
@@ -23,15 +25,17 @@ struct Open {
 }
 
 impl PictureFiles {
-    /// Opens those files of a render that have to be made.
+    /// Opens those files of a render that have to be made; of a piece of a run its parts, for a picture that begins with
+    /// `first_layer`.
     pub fn create(
         render: Ref<RenderPlan>,
-        plan: &Plan,
-        told: &str,
-        stale: &dyn Fn(&Path) -> bool,
+        run: &Run,
         grid: &Grid,
+        first_layer: usize,
         mesh_hash: &str,
     ) -> Result<Self, Error> {
+        let Run { plan, told, .. } = run;
+        let stale = &|file: &Path| run.is_stale(file);
         let layers = plan[render].layers;
         let mut aovs: Vec<Aov> = Vec::new();
         // Each is one array, or one a layer.
@@ -46,12 +50,14 @@ impl PictureFiles {
         let mut files = Vec::new();
         for (_, write) in plan.all::<WritePlan>().filter(|(_, write)| write.render == render) {
             for file in write.stale(Content::Voxels, stale) {
-                let path = plan.out.join(&file.path);
+                let name = if plan.piece.is_some() { file.format.part(&file.path) } else { file.path.clone() };
+                let path = plan.out.join(&name);
                 let seen = &plan[render];
+                let opening = Opening { path: &path, plan, write, render: seen, grid, first_layer, mesh_hash, told };
                 let opened =
-                    file.format.open(Opening { path: &path, plan, write, render: seen, grid, mesh_hash, told })?;
+                    if plan.piece.is_some() { file.format.open_part(opening) } else { file.format.open(opening) }?;
                 let places = file.format.arrays(write).into_iter().flat_map(&mut place).collect();
-                files.extend(opened.map(|opened| Open { path: file.path.clone(), file: opened, places }));
+                files.extend(opened.map(|opened| Open { path: name, file: opened, places }));
             }
         }
         Ok(Self { aovs, files })
@@ -68,11 +74,19 @@ impl PictureFiles {
         mesh_hash: &str,
     ) -> Result<Self, Error> {
         let path = plan.out.join(file);
-        let opened = Format::Vti.open(Opening { path: &path, plan, write, render, grid, mesh_hash, told })?;
+        let opening = Opening { path: &path, plan, write, render, grid, first_layer: 0, mesh_hash, told };
+        let opened = Format::Vti.open(opening)?;
         let aovs = Format::Vti.arrays(write);
         let places: Vec<usize> = (0..aovs.iter().map(|aov| aov.count(render.layers)).sum()).collect();
         let open = opened.map(|opened| Open { path: file.to_owned(), file: opened, places });
         Ok(Self { aovs, files: open.into_iter().collect() })
+    }
+
+    /// Opens no file: the arrays of a picture are kept in memory.
+    pub fn memory(aovs: &[Aov], layers: usize, kept: Rc<RefCell<Vec<Array>>>) -> Self {
+        let places = (0..aovs.iter().map(|aov| aov.count(layers)).sum()).collect();
+        let file: Box<dyn VoxelFile> = Box::new(Kept(kept));
+        Self { aovs: aovs.to_vec(), files: vec![Open { path: PathBuf::new(), file, places }] }
     }
 
     /// What the files need of each slab, in this order.
@@ -97,5 +111,24 @@ impl PictureFiles {
     /// Completes the files and gives them their names; returns each with its length.
     pub fn finish(self) -> Result<Vec<(PathBuf, u64)>, Error> {
         self.files.into_iter().map(|Open { path, file, .. }| Ok((path, file.finish()?))).collect()
+    }
+}
+
+/// Arrays in memory that grow slab by slab.
+struct Kept(Rc<RefCell<Vec<Array>>>);
+
+impl VoxelFile for Kept {
+    fn add_slab(&mut self, _: usize, slab: &[&Array]) -> Result<(), Error> {
+        let mut kept = self.0.borrow_mut();
+        if kept.is_empty() {
+            kept.extend(slab.iter().map(|&array| array.clone()));
+        } else {
+            kept.iter_mut().zip(slab).for_each(|(all, more)| all.values.append(&more.values));
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<u64, Error> {
+        Ok(0)
     }
 }

@@ -5,12 +5,14 @@
 //! the index: a new format is one file and one row.
 
 mod files;
+mod join;
 mod png;
 mod raw;
 pub(super) mod vti;
 pub(super) mod vtu;
 
 use std::io::{BufReader, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -22,6 +24,7 @@ use super::camera::camera;
 use super::describe::{Counts, Totals, size};
 use super::occlusion;
 use super::picture::array_bytes;
+use super::piece::{self, Piece};
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
 use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
@@ -33,6 +36,7 @@ use crate::render::{Accuracy, Aov, Camera};
 use crate::volume::{Array, Grid};
 
 pub(super) use files::PictureFiles;
+pub(super) use join::join;
 
 /// Name and version, as files record it.
 pub(crate) const PROGRAM: &str = concat!("ao4d ", env!("CARGO_PKG_VERSION"));
@@ -75,6 +79,35 @@ trait OutputFormat {
         Ok(None)
     }
 
+    /// What the part of a file is called that a piece of a run makes.
+    fn part(file: &Path) -> PathBuf {
+        file.to_owned()
+    }
+
+    /// Opens a part for some layers of a picture's arrays.
+    fn open_part(file: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+        Self::open(file)
+    }
+
+    /// Reads a part: as many voxels in all, with the arrays that the format needs of a picture, in its order.
+    fn read_part(_path: &Path, _write: &WritePlan, _image: Image, _voxels: usize) -> Result<Vec<Array>, Error> {
+        Ok(Vec::new())
+    }
+
+    /// Writes the list of the parts of a picture, each with its layers and where it is.
+    fn write_list(
+        _path: &Path,
+        _write: &WritePlan,
+        _image: Image,
+        _grid: &Grid,
+        _parts: &[(Range<usize>, String)],
+    ) -> Result<u64, Error> {
+        Ok(0)
+    }
+
+    /// Whether parts have such a list.
+    const LISTED: bool = false;
+
     /// Puts another text in the place of the one that a file tells of the pipeline; none if its files tell none.
     const RETELL: Option<Retell> = None;
 
@@ -85,6 +118,7 @@ trait OutputFormat {
         _mesh: &Mesh<D>,
         _camera: &Camera<D>,
         _found: Found<D>,
+        _part: Option<MeshPart>,
     ) -> Result<(u64, usize), Error> {
         Ok((0, 0))
     }
@@ -122,6 +156,37 @@ pub(super) struct Found<'a, const D: usize> {
     pub vectors: Option<&'a [Vector<D>]>,
 }
 
+/// The part of a mesh that a piece of a run writes: the simplices whose first vertex is among these.
+pub(super) struct MeshPart<'a> {
+    /// The vertices.
+    pub vertices: Range<usize>,
+    /// The list of all parts, and where they are, if it is this one's to write.
+    pub list: Option<(&'a Path, Vec<String>)>,
+}
+
+impl<'a> MeshPart<'a> {
+    /// The part of a piece, of a mesh with so many vertices; the first piece writes the list.
+    pub fn of(piece: Piece, vertices: usize, file: &Path, list: &'a Path) -> Self {
+        let list = (piece.index() == 0).then(|| (list, parts_of(file, Piece::all(piece.count()))));
+        Self { vertices: piece.share(vertices), list }
+    }
+
+    /// Whether a simplex belongs to it.
+    pub fn has<const D: usize>(&self, simplex: &[u32; D]) -> bool {
+        has_first(&self.vertices, simplex)
+    }
+}
+
+/// Whether the first vertex of a simplex, in the mesh's order, is among these.
+pub(super) fn has_first<const D: usize>(vertices: &Range<usize>, simplex: &[u32; D]) -> bool {
+    simplex.iter().min().is_some_and(|&first| vertices.contains(&(first as usize)))
+}
+
+/// Where the parts of a file of the pieces of a run are, as each of them names it.
+pub(super) fn parts_of(file: &Path, pieces: impl Iterator<Item = Piece>) -> Vec<String> {
+    pieces.map(|piece| piece::beside(file, piece)).collect()
+}
+
 /// What a file is opened with.
 struct Opening<'a> {
     path: &'a Path,
@@ -129,7 +194,10 @@ struct Opening<'a> {
     write: &'a WritePlan,
     /// The picture's render; of a frame of an animation the one that has its camera.
     render: &'a RenderPlan,
+    /// Of a part its own layers alone.
     grid: &'a Grid,
+    /// Of a part which of the picture's layers is its first.
+    first_layer: usize,
     mesh_hash: &'a str,
     told: &'a str,
 }
@@ -217,6 +285,33 @@ macro_rules! formats {
                 match self { $(Self::$name => <$key::$name>::RETELL),+ }
             }
 
+            fn part(self, file: &Path) -> PathBuf {
+                match self { $(Self::$name => <$key::$name>::part(file)),+ }
+            }
+
+            fn open_part(self, file: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+                match self { $(Self::$name => <$key::$name>::open_part(file)),+ }
+            }
+
+            fn read_part(self, path: &Path, write: &WritePlan, image: Image, voxels: usize) -> Result<Vec<Array>, Error> {
+                match self { $(Self::$name => <$key::$name>::read_part(path, write, image, voxels)),+ }
+            }
+
+            fn is_listed(self) -> bool {
+                match self { $(Self::$name => <$key::$name>::LISTED),+ }
+            }
+
+            fn write_list(
+                self,
+                path: &Path,
+                write: &WritePlan,
+                image: Image,
+                grid: &Grid,
+                parts: &[(Range<usize>, String)],
+            ) -> Result<u64, Error> {
+                match self { $(Self::$name => <$key::$name>::write_list(path, write, image, grid, parts)),+ }
+            }
+
             fn write_mesh<const D: usize>(
                 self,
                 path: &Path,
@@ -224,8 +319,9 @@ macro_rules! formats {
                 mesh: &Mesh<D>,
                 camera: &Camera<D>,
                 found: Found<D>,
+                part: Option<MeshPart>,
             ) -> Result<(u64, usize), Error> {
-                match self { $(Self::$name => <$key::$name>::write_mesh(path, told, mesh, camera, found)),+ }
+                match self { $(Self::$name => <$key::$name>::write_mesh(path, told, mesh, camera, found, part)),+ }
             }
 
             /// The file that is written under its key.
@@ -324,8 +420,13 @@ impl Files {
 }
 
 impl WritePlan {
+    /// Whether a file of it is one of the mesh.
+    pub(super) fn has_mesh(&self) -> bool {
+        self.files.iter().any(|file| file.format.content() == Content::Mesh)
+    }
+
     /// Whether its files have the vector b, at voxels or at vertices.
-    fn has_directions(&self) -> bool {
+    pub(super) fn has_directions(&self) -> bool {
         self.arrays_given && self.arrays.contains(&Aov::BentNormal)
     }
 
@@ -436,6 +537,30 @@ impl Stage for WritePlan {
         plan[me].files.iter().map(output).collect()
     }
 
+    /// Parts of pictures with what is known of them, and of meshes; the first piece has the lists of all parts.
+    fn parts(me: Ref<Self>, plan: &Plan, keys: &Keys, piece: Piece) -> Vec<Output> {
+        let (write, is_first) = (&plan[me], piece.index() == 0);
+        let render = &plan[write.render];
+        let slab = piece.layers(render.dimensions[2], write.render.nth());
+        let mut parts = Vec::new();
+        for (output, WriteFile { format, .. }) in Self::outputs(me, plan, keys).into_iter().zip(&write.files.0) {
+            let list = (is_first && format.is_listed()).then(|| piece::list_of(&output.file));
+            if format.content() == Content::Mesh {
+                parts.push(Output { beside: list.into_iter().collect(), ..output });
+                continue;
+            }
+            parts.extend(list.map(|file| {
+                let key = keys.hash(&(&output.key, "list"));
+                Output { file, beside: Vec::new(), key, tells: None }
+            }));
+            let Some(slab) = &slab else { continue };
+            let (file, key) = (format.part(&output.file), keys.hash(&(&output.key, &slab.own, slab.end)));
+            let tells = output.tells.filter(|tells| *tells == file);
+            parts.push(Output { beside: vec![piece::record_of(&file)], key, tells, file });
+        }
+        parts
+    }
+
     fn retell(me: Ref<Self>, plan: &Plan, output: &Path, text: &str) -> Result<u64, Error> {
         let write = &plan[me];
         let file = write.files.iter().find(|file| file.path == output).and_then(|file| file.format.retell());
@@ -497,21 +622,30 @@ impl Stage for WritePlan {
     fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
         let plan = run.plan;
         let write = &plan[me];
+        if let Some(piece) = plan.piece {
+            write_lists(me, piece, run)?;
+        }
         for WriteFile { format, path } in write.stale(Content::Mesh, &|file| run.is_stale(file)) {
             let render = &plan[write.render];
             if let Some(occlusion) = render.occlusion {
                 occlusion::values(occlusion, run, scene)?;
             }
             let directions = match render.occlusion.filter(|_| write.has_directions()) {
-                Some(occlusion) => Some(scene.directions(occlusion, run)?),
+                Some(occlusion) => Some(scene.directions_of_mesh(occlusion, run)?),
                 None => None,
             };
             let (mesh, camera) = (scene.session.mesh(), camera(&render.camera)?);
             let found = Found {
                 values: render.occlusion.map(|occlusion| &*scene.values[&occlusion]),
-                vectors: directions.as_ref().map(|found| found.vectors.as_slice()),
+                vectors: directions.as_deref(),
             };
-            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), run.told, mesh, &camera, found)?;
+            let list = piece::list_of(path);
+            let part = plan.piece.map(|piece| MeshPart::of(piece, mesh.vertices.len(), path, &list));
+            let is_list = part.as_ref().is_some_and(|part| part.list.is_some());
+            let (bytes, left_out) = format.write_mesh(&plan.out.join(path), run.told, mesh, &camera, found, part)?;
+            if is_list {
+                run.made_beside(&list, 0)?;
+            }
             let note = format!(
                 "{}: {left_out} of {} simplices are not wholly before the eye and are left out",
                 path.display(),
@@ -521,6 +655,23 @@ impl Stage for WritePlan {
         }
         Ok(String::new())
     }
+}
+
+/// Writes the lists of the parts of pictures that have to be made.
+fn write_lists(me: Ref<WritePlan>, piece: Piece, run: &mut Run) -> Result<(), StageError> {
+    let (plan, write) = (run.plan, &run.plan[me]);
+    let render = &plan[write.render];
+    let grid = render.grid(plan)?;
+    let parts = Piece::of_picture(piece.count(), render.dimensions[2], write.render.nth());
+    for WriteFile { format, path } in write.files.iter().filter(|file| file.format.content() == Content::Voxels) {
+        let list = piece::list_of(path);
+        if format.is_listed() && run.is_stale(&list) {
+            let parts: Vec<_> = parts.iter().map(|(p, slab)| (slab.layers(), piece::beside(path, *p))).collect();
+            let bytes = format.write_list(&plan.out.join(&list), write, Image::of(plan, render), &grid, &parts)?;
+            run.made(&list, bytes, Vec::new())?;
+        }
+    }
+    Ok(())
 }
 
 /// Why a render can't have this array, if so.

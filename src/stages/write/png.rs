@@ -1,12 +1,13 @@
 //! `.png`: a quick look at three slices, without ParaView.
 
 use std::io::Read;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{Content, LeftOut, Opening, OutputFormat, Retell, VoxelFile, WritePlan, copy_over};
+use super::{Content, Image, LeftOut, Opening, OutputFormat, Retell, VoxelFile, WritePlan, copy_over, vti};
 use crate::io::png::{self, Slices};
 use crate::io::{AtomicFile, Error, PIPELINE};
 use crate::render::Aov;
+use crate::stages::piece;
 use crate::volume::{Array, Values};
 
 pub(super) struct Png;
@@ -30,6 +31,19 @@ impl OutputFormat for Png {
             png::retell(&bytes, out, (PIPELINE, text))
         })
     });
+
+    /// The colours of its layers.
+    fn part(file: &Path) -> PathBuf {
+        piece::stand_in(file)
+    }
+
+    fn open_part(Opening { path, grid, first_layer, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+        vti::open_colours(path, grid, first_layer)
+    }
+
+    fn read_part(path: &Path, _: &WritePlan, _: Image, voxels: usize) -> Result<Vec<Array>, Error> {
+        vti::read_colours(path, voxels)
+    }
 
     fn open(Opening { path, grid, told, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
         let out = AtomicFile::create(path)?;

@@ -1,12 +1,12 @@
 //! `.raw`: colours alone, without a header, as the thesis had them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{Content, Image, LeftOut, Opening, OutputFormat, VoxelFile, WritePlan};
 use crate::io::raw::RawWriter;
 use crate::io::{AtomicFile, Error};
 use crate::render::Aov;
-use crate::volume::{Array, Values};
+use crate::volume::{Array, Kind, Values};
 
 pub(super) struct Raw;
 
@@ -24,6 +24,15 @@ impl OutputFormat for Raw {
 
     fn voxel_bytes(_: &WritePlan, image: Image) -> u64 {
         image.bytes(Aov::Rgb)
+    }
+
+    fn read_part(path: &Path, _: &WritePlan, _: Image, voxels: usize) -> Result<Vec<Array>, Error> {
+        let failed = |cause| Error::File { path: path.to_owned(), action: "be used as a part", cause };
+        let bytes = crate::input::read(path).map_err(failed)?;
+        if bytes.len() as u128 != 12 * voxels as u128 {
+            return Err(failed(std::io::Error::other(format!("it has {} bytes, not {voxels} times 12", bytes.len()))));
+        }
+        Ok(vec![Array::new(Aov::Rgb.name(), 3, Kind::F32.decode(&bytes, true))])
     }
 
     fn open(Opening { path, grid, .. }: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {

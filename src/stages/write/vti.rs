@@ -1,5 +1,6 @@
 //! `.vti`: VTK image data, with the arrays that are asked for, and what they were made from.
 
+use std::ops::Range;
 use std::path::Path;
 
 use serde_json::json;
@@ -10,13 +11,13 @@ use super::{
 };
 use crate::geometry::Dimension;
 use crate::io::vti::{self, ArraySpec, VtiWriter};
-use crate::io::{AtomicFile, Error, PIPELINE};
+use crate::io::{AtomicFile, Error, PIPELINE, parts, vtk};
 use crate::render::{Accuracy, Aov};
 use crate::stages::Plan;
 use crate::stages::occlusion::OcclusionSource;
 use crate::stages::render::RenderPlan;
 use crate::stages::screen_space::WORD;
-use crate::volume::Array;
+use crate::volume::{Array, Grid};
 
 pub(super) struct Vti;
 
@@ -45,20 +46,96 @@ impl OutputFormat for Vti {
         }
     }
 
+    /// How far off a picture is, is known only when all of it is there.
+    fn open_part(opening: Opening) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+        let Opening { path, plan, write, render, grid, first_layer, mesh_hash, told } = opening;
+        let settings = settings(plan, write, render, mesh_hash, told, path.parent());
+        let settings = vti::Settings { first_layer, numbers: Vec::new(), ..settings };
+        open_file(path, grid, &specs(&write.arrays, Image::of(plan, render)), &settings)
+    }
+
+    fn read_part(path: &Path, write: &WritePlan, image: Image, voxels: usize) -> Result<Vec<Array>, Error> {
+        read_arrays(path, &specs(&write.arrays, image), voxels)
+    }
+
+    fn write_list(
+        path: &Path,
+        write: &WritePlan,
+        image: Image,
+        grid: &Grid,
+        parts: &[(Range<usize>, String)],
+    ) -> Result<u64, Error> {
+        let mut file = AtomicFile::create(path)?;
+        let parts = parts.iter().map(|(layers, file)| (layers.clone(), file.as_str()));
+        parts::image(&mut file, grid, &specs(&write.arrays, image), parts).map_err(AtomicFile::name_in(path))?;
+        file.commit()
+    }
+
+    const LISTED: bool = true;
+
     const RETELL: Option<Retell> = Some(|path, write, text| {
         copy_over(path, |source, out| vti::retell(source, out, encoding(write), (PIPELINE, text)))
     });
 
     fn open(
-        Opening { path, plan, write, render, grid, mesh_hash, told }: Opening,
+        Opening { path, plan, write, render, grid, first_layer, mesh_hash, told }: Opening,
     ) -> Result<Option<Box<dyn VoxelFile>>, Error> {
         let image = Image::of(plan, render);
-        let specs: Vec<ArraySpec> = write.arrays.iter().flat_map(|&aov| array_specs(aov, image)).collect();
         let settings = settings(plan, write, render, mesh_hash, told, path.parent());
-        let out = AtomicFile::create(path)?;
-        let writer = VtiWriter::new(out, grid, &specs, &settings).map_err(AtomicFile::name_in(path))?;
-        Ok(Some(Box::new(File { path: path.to_owned(), writer })))
+        let settings = vti::Settings { first_layer, ..settings };
+        open_file(path, grid, &specs(&write.arrays, image), &settings)
     }
+}
+
+/// Opens a file for these arrays.
+fn open_file(
+    path: &Path,
+    grid: &Grid,
+    specs: &[ArraySpec],
+    settings: &vti::Settings,
+) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+    let out = AtomicFile::create(path)?;
+    let writer = VtiWriter::new(out, grid, specs, settings).map_err(AtomicFile::name_in(path))?;
+    Ok(Some(Box::new(File { path: path.to_owned(), writer })))
+}
+
+/// A `.vti` of nothing but colours, packed: the part of a file that has no parts in its own format.
+pub(super) fn open_colours(path: &Path, grid: &Grid, first_layer: usize) -> Result<Option<Box<dyn VoxelFile>>, Error> {
+    let (compression, scratch) = (vti::Compression::Lz4, path.parent().map(Path::to_owned));
+    let settings = vti::Settings { compression, scratch, first_layer, ..vti::Settings::default() };
+    open_file(path, grid, &colours(), &settings)
+}
+
+/// Reads such a part.
+pub(super) fn read_colours(path: &Path, voxels: usize) -> Result<Vec<Array>, Error> {
+    read_arrays(path, &colours(), voxels)
+}
+
+fn colours() -> Vec<ArraySpec> {
+    vec![ArraySpec::new(Aov::Rgba.name(), Aov::Rgba.kind(), 4)]
+}
+
+/// Reads just these arrays of so many voxels.
+fn read_arrays(path: &Path, specs: &[ArraySpec], voxels: usize) -> Result<Vec<Array>, Error> {
+    let failed = |cause: String| Error::File {
+        path: path.to_owned(),
+        action: "be used as a part",
+        cause: std::io::Error::other(cause),
+    };
+    let mut found = vtk::read_volume(path).map_err(|error| failed(error.to_string()))?.arrays;
+    let array = |spec: &ArraySpec| {
+        let at = found.iter().position(|array| {
+            let alike = array.components == spec.components.len() && array.values.kind() == spec.kind;
+            array.name == spec.name && alike && array.tuples() == voxels
+        });
+        at.map(|at| found.swap_remove(at)).ok_or_else(|| failed(format!("it lacks `{}` of {voxels} voxels", spec.name)))
+    };
+    specs.iter().map(array).collect()
+}
+
+/// What a file with these arrays holds.
+fn specs(aovs: &[Aov], image: Image) -> Vec<ArraySpec> {
+    aovs.iter().flat_map(|&aov| array_specs(aov, image)).collect()
 }
 
 struct File {
@@ -105,8 +182,21 @@ pub(in crate::stages) fn retell(path: &Path, text: &str) -> Result<u64, Error> {
     copy_over(path, |source, out| vti::retell(source, out, vti::Encoding::Appended, (PIPELINE, text)))
 }
 
+/// Takes a whole file that a piece of a run made, with this text of the pipeline; returns its length.
+pub(in crate::stages) fn take(part: &Path, path: &Path, encoding: Encoding, text: &str) -> Result<u64, Error> {
+    let failed = |cause| Error::File { path: part.to_owned(), action: "be read", cause };
+    let source = std::io::BufReader::with_capacity(1 << 18, crate::input::open(part).map_err(failed)?);
+    let mut file = AtomicFile::create(path)?;
+    vti::retell(source, &mut file, encoding_of(encoding), (PIPELINE, text)).map_err(AtomicFile::name_in(path))?;
+    file.commit()
+}
+
 fn encoding(write: &WritePlan) -> vti::Encoding {
-    match write.encoding {
+    encoding_of(write.encoding)
+}
+
+fn encoding_of(encoding: Encoding) -> vti::Encoding {
+    match encoding {
         Encoding::Appended => vti::Encoding::Appended,
         Encoding::Inline => vti::Encoding::Inline,
     }

@@ -6,7 +6,7 @@
 mod packet;
 mod scalar;
 
-pub use packet::{Level, PacketTracer};
+pub use packet::{Level, PacketTracer, Watch};
 pub use scalar::{ScalarBackend, estimate_at};
 
 pub(super) use scalar::first_hit;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::packet::Watch;
 use crate::accel::Tracer;
 use crate::geometry::{Dimension, Ray};
 use crate::progress::{Cancelled, Progress};
@@ -27,6 +28,17 @@ pub fn estimate_at<const D: usize>(
     if tracer.mesh().is_translucent() {
         return translucent::estimate_at(tracer, point, sampling, progress);
     }
+    watched_at(tracer, point, sampling, None, progress)
+}
+
+/// The same of opaque objects, and tells each ray to `watch`: where it goes, and whether it escapes.
+pub(super) fn watched_at<const D: usize>(
+    tracer: &Tracer<D>,
+    point: &ShadingPoint<D>,
+    sampling: &Sampling,
+    mut watch: Option<&mut Watch<D>>,
+    progress: &dyn Progress,
+) -> Result<Estimate, Cancelled> {
     let surroundings = Surroundings::of(tracer, point);
     if surroundings.normal.amax() == 0.0 {
         return Ok(Estimate::known(1.0));
@@ -38,7 +50,11 @@ pub fn estimate_at<const D: usize>(
         if accumulator.rays().is_multiple_of(RAYS_BETWEEN_LOOKS) && progress.cancelled() {
             return Err(Cancelled);
         }
-        let visible = surroundings.is_visible(tracer, sequence.next_direction(&frame), sampling.max_distance);
+        let direction = sequence.next_direction(&frame);
+        let visible = surroundings.is_visible(tracer, direction, sampling.max_distance);
+        if let Some(watch) = &mut watch {
+            watch(direction, visible);
+        }
         accumulator.add(u64::from(visible), 1);
     }
     Ok(accumulator.estimate())

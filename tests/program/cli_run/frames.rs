@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use ao4d::io::series;
+use ao4d::io::vtk::read_volume;
 use ao4d::pipeline::Pipeline;
 use ao4d::stages::animate::AnimatePlan;
 use serde_json::Value;
@@ -119,6 +120,49 @@ fn objects_that_move_among_others_have_occlusion_of_their_own_in_each_frame() {
     let set = "image.camera={eye: [0, 0, 0, -3], target: [0, 0, 0, -1], up: [0, 1, 0, 0], field_of_view: 60}";
     folder.runs(&["--set", set, "--out", "half"]);
     assert!(same(&folder, "half/image.vti", "out/film/all_0001.vti"));
+}
+
+#[test]
+fn the_sky_stands_still_while_an_eye_or_a_scene_moves_below_it() {
+    let folder = film(
+        "  - animate: {id: eye, frames: 3, turn: {plane: xw, to: 60}, vti: eye.vti, arrays: [light, opacity]}
+  - animate: {id: scene, input: image, moves: scene, frames: 2, turn: {plane: xy, to: 90}, vti: scene.vti, arrays: [light, opacity]}
+",
+    );
+    let text = std::fs::read_to_string(folder.path("p.yaml")).unwrap();
+    let lit =
+        text.replace("dimensions: [9, 8, 7],", "dimensions: [9, 8, 7], sky: {gradient: [0, 0.9, 0, 0]}, bounce: 1,");
+    std::fs::write(folder.path("p.yaml"), &lit).unwrap();
+    folder.runs(&[]);
+    // Each frame is the picture with that frame's camera under the same sky.
+    let plan = Pipeline::load(&folder.path("p.yaml"), &[], None).unwrap().plan;
+    let eye = plan.all::<AnimatePlan>().map(|(_, animation)| animation).next().unwrap().render(2, &plan).camera;
+    let camera = serde_json::to_value(eye).unwrap();
+    let (eye, target, up, over) = (&camera["eye"], &camera["target"], &camera["up"], &camera["over"]);
+    let single = "  - write: {input: image, vti: image.vti, arrays: [light, opacity]}\n";
+    let before = &lit[..lit.find("  - animate").unwrap()];
+    std::fs::write(folder.path("p.yaml"), format!("{before}{single}")).unwrap();
+    let set = format!("image.camera={{eye: {eye}, target: {target}, up: {up}, over: {over}, field_of_view: 60}}");
+    folder.runs(&["--set", &set, "--out", "moved"]);
+    assert!(same(&folder, "moved/image.vti", "out/film/eye_0002.vti"));
+    // A scene that turns by a right angle is lit from above all the same, as one whose objects stand so.
+    let turn = "{rotate: {plane: xy, degrees: 90, center: [0, 0, 0, -1]}}";
+    let turned = before
+        .replace("{translate: [-0.35, 0.1, 0.1, -1]}]", &format!("{{translate: [-0.35, 0.1, 0.1, -1]}}, {turn}]"));
+    let turned = turned.replace(
+        "max: [0.5, 0.4, 0.3, -0.8]}",
+        &format!("max: [0.5, 0.4, 0.3, -0.8]}}\n          transform: [{turn}]"),
+    );
+    assert_eq!(turned.matches(turn).count(), 2);
+    std::fs::write(folder.path("p.yaml"), format!("{turned}{single}")).unwrap();
+    folder.runs(&["--out", "turned"]);
+    let light = |file: &str| read_volume(&folder.path(file)).unwrap().array("light").unwrap().values.to_f64();
+    let off =
+        |a: &[f64], b: &[f64]| (a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64).sqrt();
+    let (frame, by_hand) = (light("out/film/scene_0001.vti"), light("turned/image.vti"));
+    let still = light("out/film/scene_0000.vti");
+    assert!(off(&frame, &by_hand) < 0.02, "{}", off(&frame, &by_hand));
+    assert!(off(&frame, &still) > 0.04, "{}", off(&frame, &still));
 }
 
 #[test]

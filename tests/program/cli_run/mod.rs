@@ -1,6 +1,7 @@
 //! `ao4d run` as its users see it: which files appear, what a second run does, what goes wrong and how that is told.
 
 mod caching;
+mod compose;
 mod faults;
 mod frames;
 mod input;
@@ -8,6 +9,7 @@ mod interrupt;
 mod limits;
 mod mesh;
 mod pictures;
+mod pieces;
 mod provenance;
 mod shade;
 mod twins;

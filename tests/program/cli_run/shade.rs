@@ -71,6 +71,45 @@ fn an_image_that_tells_its_camera_gets_the_occlusion_that_a_render_finds() {
     assert!(rms < 0.03, "{rms}");
 }
 
+#[test]
+fn an_image_gets_the_light_that_a_render_finds_in_it() {
+    let lit = "
+  - render: {id: lit, input: scene, occlusion: screen_space, dimensions: [14, 12, 10], dilate: 0, supersample: 1, sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1}
+  - write: {vti: lit.vti, arrays: [depth, normal, bent_normal, irradiance, bounce, bounce_error]}
+";
+    let folder =
+        Folder::with(&(PIPELINE.replace("- scene:\n", "- scene:\n      id: scene\n") + lit.trim_start_matches('\n')));
+    folder.runs(&["--out", "made"]);
+    let stage = "shade: {image: made/lit.vti, vti: shaded.vti, sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, arrays: [bent_normal, irradiance, bounce]}";
+    std::fs::write(folder.path("p.yaml"), format!("name: again\nstages:\n  - {stage}\n")).unwrap();
+    folder.runs(&["--out", "out"]);
+    let (before, after) =
+        ["made/lit.vti", "out/shaded.vti"].map(|file| read_volume(&folder.path(file)).unwrap()).into();
+    assert!(after.array("ambient_occlusion").is_none());
+    for name in ["bent_normal", "irradiance", "bounce"] {
+        let [a, b] = [&before, &after].map(|volume| volume.array(name).unwrap().values.to_f64());
+        let rms = (a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / a.len() as f64).sqrt();
+        let size = (a.iter().map(|a| a * a).sum::<f64>() / a.len() as f64).sqrt();
+        assert!(a.len() == b.len() && rms < 0.01 && size > 0.003, "{name}: {rms} of {size}");
+    }
+    for (sets, message) in [
+        (
+            "shade.arrays=[light]",
+            "of an image alone `light` is not known; take of ambient_occlusion, bent_normal, irradiance, bounce",
+        ),
+        ("shade.arrays=[bounce, bounce]", "`bounce` is there twice"),
+        ("shade.bounce=0", "no light is followed from surface to surface; say `bounce: 1`"),
+        ("shade.bounce=2", "expected 0 or 1, found 2"),
+        ("shade.albedo=paint", "it lacks the array `paint` (colours)"),
+        ("shade.sky.gradient=[0, 0.5, 0]", "expected 4 numbers"),
+        ("shade.sky.gradient=[0, 5, 0, 0]", "expected a vector of length 1 at most"),
+    ] {
+        let output = folder.run(&["--set", sets, "--out", "bad"]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && text.contains(message), "{sets}: {text}");
+    }
+}
+
 /// Some columns of a picture.
 fn cut(volume: &Volume, columns: std::ops::Range<usize>) -> Volume {
     let width = volume.grid.dimensions[0];

@@ -14,14 +14,19 @@ use crate::accel::Tracer;
 use crate::geometry::{Dimension, Frame, Ray, Vector};
 use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
-use crate::trace::cpu::scalar::estimate_at;
+use crate::trace::cpu::scalar::{estimate_at, watched_at};
 use crate::trace::estimate::{Accumulator, Estimate};
+use crate::trace::sampling::LOWEST_SQUARED_COSINE;
 use crate::trace::{Sampler, Sampling, Sequence, ShadingPoint, Target};
 
 /// Blocks of rays between two looks at whether to go on: a few milliseconds.
 const BLOCKS_BETWEEN_LOOKS: usize = 64;
 
-/// The working memory of one thread: 0.2 MB, to be used for many points.
+/// What the rays of a hemisphere rise at least, as a share of their length: a little less than the lowest cosine.
+const RISE: f32 = 9e-4;
+const _: () = assert!(RISE * RISE < 0.9 * LOWEST_SQUARED_COSINE);
+
+/// The working memory of one thread: 0.1 MB, to be used for many points.
 #[derive(Debug)]
 pub struct PacketTracer<const D: usize> {
     level: Level,
@@ -29,6 +34,9 @@ pub struct PacketTracer<const D: usize> {
     star: VertexStar<D>,
     traversal: Traversal<D>,
 }
+
+/// Is told of each ray where it goes, and whether it escapes.
+pub type Watch<'w, const D: usize> = dyn FnMut(Vector<D>, bool) + 'w;
 
 /// Rays to be traced from one point.
 enum Source<'a, const D: usize> {
@@ -46,10 +54,11 @@ struct AtVertex<'a, const D: usize> {
 }
 
 /// All that is asked at once.
-struct Job<'a, const D: usize> {
+struct Job<'a, 'w, const D: usize> {
     query: Query<'a, D>,
     vertex: Option<AtVertex<'a, D>>,
     source: Source<'a, D>,
+    watch: Option<&'a mut Watch<'w, D>>,
     progress: &'a dyn Progress,
 }
 
@@ -80,6 +89,36 @@ impl<const D: usize> PacketTracer<D> {
         sampling: &Sampling,
         progress: &dyn Progress,
     ) -> Result<Estimate, Cancelled> {
+        if tracer.mesh().is_translucent() {
+            return estimate_at(tracer, point, sampling, progress);
+        }
+        self.at(tracer, point, sampling, None, progress)
+    }
+
+    /// The same, and tells each ray to `watch`: block by block of 64, the rays of a block in an order that keeps aligned
+    /// runs of 2^k of them together. Objects that let light through count as opaque.
+    ///
+    /// # Errors
+    /// [`Cancelled`] if `progress` says so.
+    pub fn watched(
+        &mut self,
+        tracer: &Tracer<D>,
+        point: &ShadingPoint<D>,
+        sampling: &Sampling,
+        watch: &mut Watch<D>,
+        progress: &dyn Progress,
+    ) -> Result<Estimate, Cancelled> {
+        self.at(tracer, point, sampling, Some(watch), progress)
+    }
+
+    fn at(
+        &mut self,
+        tracer: &Tracer<D>,
+        point: &ShadingPoint<D>,
+        sampling: &Sampling,
+        watch: Option<&mut Watch<D>>,
+        progress: &dyn Progress,
+    ) -> Result<Estimate, Cancelled> {
         let mesh = tracer.mesh();
         let (position, normal) = (point.position(mesh), point.normal(mesh));
         if normal.amax() == 0.0 {
@@ -89,9 +128,8 @@ impl<const D: usize> PacketTracer<D> {
             ShadingPoint::Vertex(vertex) => tracer.incidence().around(mesh.identity[vertex as usize]),
             ShadingPoint::Inside { .. } => &[],
         };
-        let is_served = !mesh.is_translucent() && tracer.wide().serves(&position) && tracer.wide().holds(around, mesh);
-        if !is_served {
-            return estimate_at(tracer, point, sampling, progress);
+        if !(tracer.wide().serves(&position) && tracer.wide().holds(around, mesh)) {
+            return watched_at(tracer, point, sampling, watch, progress);
         }
         let vertex = match *point {
             ShadingPoint::Vertex(vertex) => {
@@ -101,14 +139,14 @@ impl<const D: usize> PacketTracer<D> {
             ShadingPoint::Inside { .. } => None,
         };
         let ignored = point.ignored(tracer);
-        let query = Query::new(tracer, position, normal, sampling.max_distance, &ignored);
+        let query = Query::new(tracer, position, (normal, RISE), sampling.max_distance, [&ignored, around]);
         let source = Source::Sequence {
             sequence: Sequence::new(sampling.sampler, sampling.seed, point.number()),
             frame: Frame::new(&normal),
             samples: sampling.samples,
             target: sampling.target,
         };
-        Ok(self.traced(Job { query, vertex, source, progress })?.estimate())
+        Ok(self.traced(Job { query, vertex, source, watch, progress })?.estimate())
     }
 
     /// How many of the rays from a point in these directions, none longer than 1, hit a simplex other than `ignored`
@@ -130,10 +168,10 @@ impl<const D: usize> PacketTracer<D> {
         // Left out only if all rays surely are on its side.
         let on_side = directions.iter().all(|d| d.dot(&normal) > 1e-5);
         let normal = if on_side { normal } else { Vector::zeros() };
-        let query = Query::new(tracer, *origin, normal, limit, ignored.as_slice());
+        let query = Query::new(tracer, *origin, (normal, 0.0), limit, [ignored.as_slice(), &[]]);
         let source = Source::Directions(directions);
         // Nobody cancels.
-        let found = self.traced(Job { query, vertex: None, source, progress: &Silent });
+        let found = self.traced(Job { query, vertex: None, source, watch: None, progress: &Silent });
         found.map_or(0, |found| found.rays() - found.escaped())
     }
 
@@ -184,7 +222,7 @@ with_avx512!(compiled_for_avx512);
 /// Counts the rays that escape.
 #[inline(always)]
 fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
-    let Job { query, vertex, mut source, progress } = job;
+    let Job { query, vertex, mut source, mut watch, progress } = job;
     let query = &query;
     let around = match &vertex {
         Some(at) => {
@@ -208,9 +246,9 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
         let count = BLOCK.min(total - first);
         match &mut source {
             Source::Sequence { sequence, frame, .. } => packets.rays.take(sequence, frame, count),
-            Source::Directions(directions) => packets.rays.set(&directions[first..first + count]),
+            Source::Directions(directions) => packets.rays.set(&directions[first..first + count], &query.normal),
         }
-        packets.rays.start_from(&query.centred);
+        packets.rays.complete();
         let alive = u64::MAX >> (BLOCK - count);
         let hidden = packets.star.hidden::<L>(query, &packets.rays, around, alive);
         let hit = packets.traversal.blocked::<L>(query, &packets.rays, alive & !hidden);
@@ -218,7 +256,10 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
         if !query.wide.far.nodes.is_empty() {
             open &= !query.hits_far(&packets.rays, open);
         }
-        accumulator.add(if accumulator.is_fine() { packets.rays.in_sequence(open) } else { open }, count as u32);
+        if let Some(watch) = &mut watch {
+            packets.rays.tell(open, count, watch);
+        }
+        accumulator.add(open, count as u32);
         if let Source::Sequence { target: Some(target), .. } = &source
             && target.is_met(&accumulator)
         {
