@@ -48,7 +48,7 @@ impl RenderPlan {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OCCLUSION;
             (whole, holds) = (size_of::<f32>() as u64, "one layer of its picture and the depth of all of it");
             if render.lighting.as_ref().is_some_and(|lighting| lighting.bounce) {
-                (whole, holds) = (4 * whole, "one layer of its picture, and of all of it the depth and the light");
+                (whole, holds) = (8 * whole, "one layer of its picture, and of all of it the depth and the light");
             }
         }
         if render.denoise {
