@@ -18,11 +18,11 @@ pub struct Messages {
     /// Say more; the same as --log-level debug
     #[arg(short, long, global = true)]
     pub verbose: bool,
-    /// What is said on stderr: at least this [default: info]
-    #[arg(long, value_name = "LEVEL", global = true, conflicts_with_all = ["quiet", "verbose"])]
+    /// What is said on stderr: error, warn, info, or debug [default: info]
+    #[arg(long, value_name = "LEVEL", global = true, conflicts_with_all = ["quiet", "verbose"], hide_possible_values = true)]
     pub log_level: Option<Level>,
-    /// How work is told on stderr: bar, on a terminal; json, a line of JSON for each event and message; none [default: bar]
-    #[arg(long, value_name = "FORM", global = true)]
+    /// How work is told on stderr: bar, json (a line for each event and message), or none [default: bar]
+    #[arg(long, value_name = "FORM", global = true, hide_possible_values = true)]
     pub progress: Option<Form>,
 }
 
