@@ -4,14 +4,18 @@
 mod apart;
 mod build;
 mod bvh;
+mod lines;
 mod node;
 mod overlap;
 mod passages;
+mod rows;
 mod tracer;
 mod wide;
 
 pub use bvh::Bvh;
+pub use lines::Row;
 pub use node::Node;
 pub use passages::{Candidate, Passage, Wanted};
+pub use rows::{BOTTOM, LEAF, Leaf, NODE, Reference, WIDTH, WideNode, place};
 pub use tracer::{Hit, Tracer};
-pub use wide::{Leaf, Scale, TAG_BITS, WIDTH, WideBvh, WideNode};
+pub use wide::{Scale, WideBvh};

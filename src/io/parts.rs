@@ -73,7 +73,7 @@ fn name(file: &str) -> Result<String, Error> {
     if file.is_empty() || file.chars().any(char::is_control) {
         return Err(Error::Name { what: "the file name", name: file.into() });
     }
-    Ok(escape(file).into())
+    Ok(escape(file))
 }
 
 #[cfg(test)]

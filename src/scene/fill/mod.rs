@@ -1,9 +1,9 @@
 //! The solid within a closed surface of triangles, in tetrahedra.
 //!
 //! A solid that some point inside sees all of, such as every convex one, is cut into one tetrahedron a triangle by joining
-//! its triangles to that point ([`kernel`]). Any other is cut in two by a plane across an axis, far from all its corners,
-//! and the section is filled with triangles that both halves share ([`complex`], [`section`]); and so on with the halves
-//! ([`cells`]). Cuts go through triangles of the surface too: these are divided, never moved, and its own vertices stay where
+//! its triangles to that point ([`kernel`]). Any other is cut in two by a plane, far from corners, and the section
+//! is filled with triangles that both halves share ([`complex`], [`section`]); and so on with the halves. Of several planes that
+//! is taken whose halves promise the fewest pieces ([`cells`]). Cuts go through triangles of the surface too: these are divided, never moved, and its own vertices stay where
 //! they are.
 //!
 //! Nothing here asks whether four points lie in one plane. The corners of flat faces do but for their last digit, once a body
@@ -16,11 +16,12 @@
 //! triangle on prisms whose flat faces are off by a last digit, most of them slivers), and constrained Delaunay
 //! tetrahedralisation (few pieces, but slivers between corners of a flat face, and no crate with a free licence).
 //!
-//! A surface that is open has no inside and is refused, and so is one of which a section shows that it passes through
-//! itself. Bodies that overlap, each closed, are each filled where no section has both.
+//! A surface that is open has no inside and is refused, and so is one that passes through itself, as bodies that overlap do
+//! ([`crossings`]).
 
 mod cells;
 mod complex;
+mod crossings;
 mod kernel;
 mod polygon;
 pub mod section;
@@ -30,6 +31,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Matrix3;
 
+use self::cells::{Cut, winding};
 use self::complex::{Complex, Side};
 use self::kernel::{Deepest, Plane, deepest};
 use crate::geometry::Vector64;
@@ -78,6 +80,19 @@ pub fn fill(
     if enclosed_volume(corners(&near, &triangles)) < LEAST * LEAST {
         return Err(nothing().into());
     }
+    if let Some([one, other]) = crossings::crossing(&near, &triangles) {
+        let middle =
+            |i: usize| frame.outwards(&(triangles[i].iter().map(|&p| near[p as usize]).sum::<Vector64<3>>() / 3.0));
+        let place = |i: usize| middle(i).iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ");
+        let how = match one == other {
+            true => format!("the triangle at ({}) is inside a body that the rest of its own is not inside", place(one)),
+            false => format!("the triangles at ({}) and at ({})", place(one), place(other)),
+        };
+        return Err(Unfilled::Refused(format!(
+            "passes through itself, or has bodies that overlap: {how}; unite them in the program that made them, write each as \
+             an object of its own, or write caps: false for walls only"
+        )));
+    }
     let (mut complex, whole) = Complex::new(near, &triangles);
     let own = points.len() as u32;
     let crossed = |point: Vector64<3>| {
@@ -87,6 +102,7 @@ pub fn fill(
              write caps: false for walls only"
         )
     };
+    let tries = (MOST_TRIED / triangles.len()).clamp(3, 9);
     let mut leaves: Vec<(Vec<Side>, Apex)> = Vec::new();
     let mut open: Vec<(Vec<Side>, u32)> = vec![(whole, 0)];
     while let Some((cell, cuts)) = open.pop() {
@@ -100,20 +116,10 @@ pub fn fill(
                 leaves.push((part, apex));
                 continue;
             }
-            let mut trouble = complex.points[corners[0] as usize];
-            let mut halves = None;
-            for cut in cells::cuts(&complex, &part, &corners, 2.0 * LEAST) {
-                match complex.cut(&part, cut.axis, cut.at) {
-                    Ok(found) => {
-                        halves = Some(found);
-                        break;
-                    }
-                    Err(near) => trouble = near,
-                }
+            match best_cut(&mut complex, &part, &corners, own, cuts, tries, progress) {
+                Ok(cells) => open.extend(cells.into_iter().rev().map(|cell| (cell, cuts + 1))),
+                Err(trouble) => return Err(crossed(trouble).into()),
             }
-            let Some([below, above]) = halves else { return Err(crossed(trouble).into()) };
-            open.push((above, cuts + 1));
-            open.push((below, cuts + 1));
         }
     }
     let tetrahedra = tetrahedra(&mut complex, leaves).map_err(crossed)?;
@@ -245,7 +251,7 @@ fn apex(complex: &Complex, cell: &[Side], corners: &[u32], own: u32, cuts: u32) 
             high - low
         };
         let width = limits.iter().map(width).fold(f64::INFINITY, f64::min);
-        if depth >= share * width && covers(complex, cell, &point) == 1 {
+        if depth >= share * width && winding(complex, cell, &point) == 1 {
             return Some(Apex::Inside(point));
         }
     }
@@ -263,21 +269,78 @@ fn apex(complex: &Complex, cell: &[Side], corners: &[u32], own: u32, cuts: u32) 
     corners.iter().copied().filter(|&corner| corner < own).find(sees).map(Apex::Corner)
 }
 
-/// How often a cell's boundary, all of which faces away from a point, lies around it: more than once if it passes through
-/// itself. Its solid angle, by the formula of Van Oosterom and Strackee (1983).
-fn covers(complex: &Complex, cell: &[Side], from: &Vector64<3>) -> i64 {
-    let mut angle = 0.0;
-    for &side in cell {
-        let corners = complex.corners_outward(side);
-        let at = |i: usize| complex.points[corners[i] as usize] - from;
-        for i in 1..corners.len() - 1 {
-            let [a, b, c] = [at(0), at(i), at(i + 1)];
-            let [x, y, z] = [a.norm(), b.norm(), c.norm()];
-            let cosine = x * y * z + a.dot(&b) * z + b.dot(&c) * x + c.dot(&a) * y;
-            angle += 2.0 * libm::atan2(a.cross(&b).dot(&c), cosine);
+/// How many faces are looked at for all cuts tried of a solid, about; of a cell, some of these.
+const MOST_TRIED: usize = 100_000;
+const MOST_TRIED_OF_CELL: usize = 5_000;
+
+/// What is narrower is avoided, even at the cost of more pieces.
+const NARROW: f64 = 1e-4;
+
+/// What a notch is expected to cost, in faces.
+const NOTCH: f64 = 1.0;
+
+/// Cuts a cell where the pieces promise to become the fewest.
+///
+/// # Errors
+/// A point near which no cut is possible.
+fn best_cut(
+    complex: &mut Complex,
+    cell: &[Side],
+    corners: &[u32],
+    own: u32,
+    cuts: u32,
+    tries: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<Side>>, Vector64<3>> {
+    let across = cells::cuts(complex, cell, corners, 2.0 * LEAST);
+    let tries = (MOST_TRIED_OF_CELL / cell.len()).clamp(3, tries);
+    let notches = cells::notches(complex, cell);
+    let mut tried: Vec<Cut> = cells::notch_cuts(complex, cell, &notches, tries / 3);
+    tried.extend(across.iter().take(tries - 2 * (tries / 3)));
+    let mut best: Option<(f64, Cut)> = None;
+    let mut trouble = complex.points[corners[0] as usize];
+    for cut in tried {
+        if progress.cancelled() {
+            break;
         }
+        let mark = complex.mark();
+        match complex.cut(cell, &cut.plane, cut.near.as_ref()) {
+            Ok(halves) => {
+                let (mut cost, mut done) = (0.0, true);
+                for half in halves.cells {
+                    for part in cells::parts(complex, complex.resolve(&half)) {
+                        let faces = part.len() as f64;
+                        let corners = corners_of(complex, &part);
+                        cost += faces;
+                        if apex(complex, &part, &corners, own, cuts + 1).is_none() {
+                            done = false;
+                            let weight: f64 = cells::notches(complex, &part).iter().map(|notch| notch.weight).sum();
+                            cost += NOTCH * weight * (2.0 + weight).log2() + 10.0;
+                        }
+                    }
+                }
+                cost *= 1.0 + NARROW / halves.shortest;
+                if best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, cut));
+                }
+                if done && cost < 2.0 * cell.len() as f64 {
+                    complex.undo(mark);
+                    break;
+                }
+            }
+            Err(near) => trouble = near,
+        }
+        complex.undo(mark);
     }
-    (angle / (4.0 * std::f64::consts::PI)).round() as i64
+    for cut in best.map(|(_, cut)| cut).into_iter().chain(across) {
+        let mark = complex.mark();
+        match complex.cut(cell, &cut.plane, cut.near.as_ref()) {
+            Ok(halves) => return Ok(halves.cells.into()),
+            Err(near) => trouble = near,
+        }
+        complex.undo(mark);
+    }
+    Err(trouble)
 }
 
 /// Joins the faces of each cell to its apex.

@@ -637,7 +637,7 @@ impl Stage for WritePlan {
             let (mesh, camera) = (scene.session.mesh(), camera(&render.camera)?);
             let found = Found {
                 values: render.occlusion.map(|occlusion| &*scene.values[&occlusion]),
-                vectors: directions.as_ref().map(|found| found.as_slice()),
+                vectors: directions.as_deref(),
             };
             let list = piece::list_of(path);
             let part = plan.piece.map(|piece| MeshPart::of(piece, mesh.vertices.len(), path, &list));
