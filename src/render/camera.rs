@@ -253,7 +253,7 @@ impl<const D: usize> Camera<D> {
     }
 
     /// The direction that has these parts along the axes of the camera's frame.
-    pub(super) fn from_frame(&self, parts: &Vector<D>) -> Vector<D> {
+    pub(super) fn out_of_frame(&self, parts: &Vector<D>) -> Vector<D> {
         let axes = match Dimension::of::<D>() {
             Dimension::Three => [&self.right, &self.up, &self.back, &self.back],
             Dimension::Four => [&self.right, &self.up, &self.over, &self.back],
