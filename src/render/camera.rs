@@ -259,7 +259,7 @@ impl<const D: usize> Camera<D> {
     }
 
     /// The direction that has these parts along the axes of the camera's frame.
-    pub(super) fn from_frame(&self, parts: &Vector<D>) -> Vector<D> {
+    pub(super) fn out_of_frame(&self, parts: &Vector<D>) -> Vector<D> {
         let axes = self.axes();
         narrow(&(0..D).fold(Vector64::zeros(), |sum, r| sum + axes[r] * f64::from(parts[r])))
     }

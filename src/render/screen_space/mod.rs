@@ -267,10 +267,11 @@ impl<const D: usize> DepthImage<D> {
             (0..3).for_each(|c| bounced[c] += slice.weight * found.light[c]);
         }
         if all > 0.0 {
-            let vector = self.bearings.as_ref().map_or_else(Vector::zeros, |_| self.camera.from_frame(&(vector / all)));
+            let vector =
+                self.bearings.as_ref().map_or_else(Vector::zeros, |_| self.camera.out_of_frame(&(vector / all)));
             return Seen { open: (open / all).clamp(0.0, 1.0), vector, bounced: bounced.map(|c| c / all) };
         }
-        let everywhere = || self.camera.from_frame(&narrow(&open_vector(&widen(normal))));
+        let everywhere = || self.camera.out_of_frame(&narrow(&open_vector(&widen(normal))));
         let vector = self.bearings.as_ref().map_or_else(Vector::zeros, |_| everywhere());
         Seen { open: 1.0, vector, bounced: [0.0; 3] }
     }
