@@ -55,6 +55,12 @@ impl<const D: usize> Scale<D> {
         point.map(|x| (f64::from(x) * self.factor) as f32)
     }
 
+    /// Whether a coordinate doesn't vanish when it is scaled: a box without width is told from another place only by numbers
+    /// that are exact.
+    pub fn keeps(&self, x: f32) -> bool {
+        x == 0.0 || f64::from(x.abs()) * self.factor >= 1e-30
+    }
+
     /// Scaled and moved to the middle: rounded, and within 1/2 (and that rounding) for the vertices of the scene.
     pub fn centred(&self, point: &Vector<D>) -> Vector<D> {
         ((widen(point) - self.centre) * self.factor).map(|x| x as f32)
@@ -211,10 +217,13 @@ impl<const D: usize> WideBvh<D> {
         [self.nodes * WideNode::<D>::ROWS * row, leaves]
     }
 
-    /// Whether references reach everything, boxes are fine beside the scene, and the point is near enough to them. If not,
-    /// ask the binary tree of all.
+    /// Whether references reach everything, boxes are fine beside the scene, and the point is near enough to them and keeps its
+    /// place when scaled. If not, ask the binary tree of all.
     pub fn serves(&self, point: &Vector<D>) -> bool {
-        self.fine && self.lines.len() < 1 << (32 - KIND_BITS) && self.is_near(point)
+        self.fine
+            && self.lines.len() < 1 << (32 - KIND_BITS)
+            && self.is_near(point)
+            && point.iter().all(|&x| self.scale.keeps(x))
     }
 
     /// Whether these simplices, too, lie where the coordinates of the leaves are made for.
