@@ -8,13 +8,11 @@
 //!
 //! A leaf keeps corner 0 of each simplex and the edges from there, whose rounding is in proportion to the simplex, wherever it is.
 
-use super::Scale;
-use super::lines::Row;
+use super::lines::{Row, WIDTH};
+use super::scale::Scale;
 use crate::geometry::{Aabb, Vector};
 use crate::mesh::Mesh;
 
-/// Children of a node, and simplices of a leaf.
-pub const WIDTH: usize = 8;
 /// What half widths of boxes grow by, in proportion. All rounding of a box, of the origin's distance from its middle and in
 /// the box test is less: a few numbers relative to 2^-24.
 const GROWTH: f64 = 1.0 / (1 << 20) as f64;
@@ -183,7 +181,6 @@ pub(super) fn write_leaf<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::Row;
 
     fn check<const D: usize>() {
         let scale = Scale::of(&[Vector::<D>::from_element(-3.0), Vector::from_element(5.0)]);
