@@ -7,7 +7,8 @@
 use bytemuck::{Pod, Zeroable};
 use memmap2::MmapMut;
 
-use super::WIDTH;
+/// Children of a node, and simplices of a leaf.
+pub const WIDTH: usize = 8;
 
 /// Eight numbers, one for each child of a node or each simplex of a leaf.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

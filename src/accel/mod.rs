@@ -9,13 +9,15 @@ mod node;
 mod overlap;
 mod passages;
 mod rows;
+mod scale;
 mod tracer;
 mod wide;
 
 pub use bvh::Bvh;
-pub use lines::Row;
+pub use lines::{Row, WIDTH};
 pub use node::Node;
 pub use passages::{Candidate, Passage, Wanted};
-pub use rows::{BOTTOM, LEAF, Leaf, NODE, Reference, WIDTH, WideNode, place};
+pub use rows::{BOTTOM, LEAF, Leaf, NODE, Reference, WideNode, place};
+pub use scale::Scale;
 pub use tracer::{Hit, Tracer};
-pub use wide::{Scale, WideBvh};
+pub use wide::WideBvh;

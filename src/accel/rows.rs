@@ -8,13 +8,11 @@
 //!
 //! A leaf keeps corner 0 of each simplex and the edges from there, whose rounding is in proportion to the simplex, wherever it is.
 
-use super::Scale;
-use super::lines::Row;
+use super::lines::{Row, WIDTH};
+use super::scale::Scale;
 use crate::geometry::{Aabb, Vector};
 use crate::mesh::Mesh;
 
-/// Children of a node, and simplices of a leaf.
-pub const WIDTH: usize = 8;
 /// What half widths of boxes grow by, in proportion. All rounding of a box, of the origin's distance from its middle and in
 /// the box test is less: a few numbers relative to 2^-24.
 const GROWTH: f64 = 1.0 / (1 << 20) as f64;
@@ -142,8 +140,9 @@ pub(super) fn write_node<'a, const D: usize>(
             let [low, high] = [low, high].map(|corner| f64::from(corner[axis]));
             let middle = (0.5 * (low + high)) as f32;
             let half = (high - f64::from(middle)).max(f64::from(middle) - low);
+            let is_flat = bounds.min[axis] == bounds.max[axis] && scale.keeps(bounds.min[axis]);
             rows[2 * axis].0[lane] = middle;
-            rows[2 * axis + 1].0[lane] = if half > 0.0 { ((half * (1.0 + GROWTH)) as f32).max(LEAST) } else { 0.0 };
+            rows[2 * axis + 1].0[lane] = if is_flat { 0.0 } else { ((half * (1.0 + GROWTH)) as f32).max(LEAST) };
         }
     }
     rows[2 * D].0 = bytemuck::cast(*references);
@@ -177,4 +176,43 @@ pub(super) fn write_leaf<const D: usize>(
     (0..D).for_each(|axis| about[axis] = middle[axis]);
     (about[4], about[5]) = (reach * (1.0 + 1e-5), longest * (1.0 + 1e-5));
     (about[6], about[7]) = (f32::from_bits(first), f32::from_bits(end - first));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check<const D: usize>() {
+        let scale = Scale::of(&[Vector::<D>::from_element(-3.0), Vector::from_element(5.0)]);
+        let corner = |n: usize, by: f32| Vector::<D>::from_fn(|k, _| ((n * 7 + k * 5) % 13) as f32 / 3.0 - 2.0 + by);
+        // Flat along the first axis, a step of the coordinates wide along the second, wide along the last.
+        let boxes: Vec<Aabb<D>> = (0..5)
+            .map(|n| {
+                let (min, mut max) = (corner(n, 0.0), corner(n, 0.7));
+                (max[0], max[1]) = (min[0], min[1].next_up());
+                Aabb { min, max }
+            })
+            .collect();
+        let mut rows = vec![Row([0.0; WIDTH]); WideNode::<D>::ROWS];
+        let references = std::array::from_fn(|i| i as Reference * 4);
+        write_node(&mut rows, boxes.iter(), &references, &scale);
+        let node = WideNode::<D>::at(&rows, NODE);
+        assert_eq!(node.children(), &references);
+        for (lane, bounds) in boxes.iter().enumerate() {
+            let (low, high) = (scale.scaled(&bounds.min), scale.scaled(&bounds.max));
+            for axis in 0..D {
+                let [middle, half] = [node.middle(axis), node.half(axis)].map(|row| f64::from(row[lane]));
+                assert!(middle - half <= f64::from(low[axis]) && f64::from(high[axis]) <= middle + half);
+                assert_eq!(half == 0.0, axis == 0);
+                assert!(half <= 1.01 * f64::from(high[axis] - low[axis]) + f64::from(LEAST));
+            }
+        }
+        assert!((boxes.len()..WIDTH).all(|lane| node.half(0)[lane] < 0.0));
+    }
+
+    #[test]
+    fn boxes_hold_what_they_were_made_of_and_flat_ones_stay_flat() {
+        check::<3>();
+        check::<4>();
+    }
 }

@@ -12,54 +12,17 @@
 
 use rayon::prelude::*;
 
-use super::lines::{Lines, Row};
-use super::rows::{BOTTOM, KIND_BITS, LEAF, Leaf, NODE, Reference, WIDTH, WideNode, write_leaf, write_node};
+use super::lines::{Lines, Row, WIDTH};
+use super::rows::{BOTTOM, KIND_BITS, LEAF, Leaf, NODE, Reference, WideNode, write_leaf, write_node};
+use super::scale::Scale;
 use super::{Bvh, apart};
-use crate::geometry::{Aabb, Vector, Vector64, widen};
+use crate::geometry::{Aabb, Vector, widen};
 use crate::mesh::Mesh;
 
 /// If most boxes are narrower than this, in widths of the scene, it may be one that has to be taken apart.
 const COARSE: f64 = 4.0 / (1 << 20) as f64;
 /// Cost of testing the boxes of one binary node, in simplex blocks.
 const BOX_COST: f32 = 0.4;
-
-/// Where the coordinates of the nodes and leaves come from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale<const D: usize> {
-    /// The middle of the scene.
-    pub centre: Vector64<D>,
-    /// A power of two.
-    pub factor: f64,
-}
-
-impl<const D: usize> Scale<D> {
-    /// Of the scene with these vertices.
-    pub fn of(vertices: &[Vector<D>]) -> Self {
-        Self::around(&Aabb::of(vertices))
-    }
-
-    /// Of what lies within the box.
-    pub fn around(bounds: &Aabb<D>) -> Self {
-        if bounds.is_empty() {
-            return Self { centre: Vector64::zeros(), factor: 1.0 };
-        }
-        let (min, max) = (widen(&bounds.min), widen(&bounds.max));
-        let extent = (max - min).max();
-        // A scene without extent has no simplices; any factor does.
-        let exponent = if extent > 0.0 { -extent.log2().ceil() } else { 0.0 };
-        Self { centre: (min + max) * 0.5, factor: exponent.exp2() }
-    }
-
-    /// The scaled coordinates: exact, unless they vanish beside the scene.
-    pub fn scaled(&self, point: &Vector<D>) -> Vector<D> {
-        point.map(|x| (f64::from(x) * self.factor) as f32)
-    }
-
-    /// Scaled and moved to the middle: rounded, and within 1/2 (and that rounding) for the vertices of the scene.
-    pub fn centred(&self, point: &Vector<D>) -> Vector<D> {
-        ((widen(point) - self.centre) * self.factor).map(|x| x as f32)
-    }
-}
 
 /// The wide hierarchy.
 #[derive(Clone, Debug)]
@@ -211,10 +174,13 @@ impl<const D: usize> WideBvh<D> {
         [self.nodes * WideNode::<D>::ROWS * row, leaves]
     }
 
-    /// Whether references reach everything, boxes are fine beside the scene, and the point is near enough to them. If not,
-    /// ask the binary tree of all.
+    /// Whether references reach everything, boxes are fine beside the scene, and the point is near enough to them and keeps its
+    /// place when scaled. If not, ask the binary tree of all.
     pub fn serves(&self, point: &Vector<D>) -> bool {
-        self.fine && self.lines.len() < 1 << (32 - KIND_BITS) && self.is_near(point)
+        self.fine
+            && self.lines.len() < 1 << (32 - KIND_BITS)
+            && self.is_near(point)
+            && point.iter().all(|&x| self.scale.keeps(x))
     }
 
     /// Whether these simplices, too, lie where the coordinates of the leaves are made for.

@@ -10,6 +10,7 @@
 //! - [`star`]: what the simplices around a vertex hide;
 //! - [`traverse`]: the rays through the [`crate::accel::WideBvh`];
 //! - [`leaves`]: sets of rays against the simplices of a leaf, and what is left in doubt;
+//! - [`view`]: how a leaf lies to the origin;
 //! - [`single`]: one ray against the simplices of a leaf;
 //! - [`cones`]: eight simplices as cones seen from the shading point;
 //! - [`tracer`]: all of this, point after point.
@@ -24,6 +25,7 @@ mod single;
 mod star;
 mod tracer;
 mod traverse;
+mod view;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

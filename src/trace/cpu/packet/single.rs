@@ -8,8 +8,8 @@
 use super::cones::{dot, minor};
 use super::directions::Rays;
 use super::lanes::Lanes;
-use super::leaves::{View, columns};
 use super::query::Query;
+use super::view::{View, columns};
 use crate::accel::Leaf;
 use crate::geometry::Dimension;
 
