@@ -72,9 +72,23 @@ pub fn parts(complex: &Complex, cell: Vec<Side>) -> Vec<Vec<Side>> {
     solids.into_iter().map(|(sides, _)| sides).collect()
 }
 
+/// Cuts a cell: what is below, what is above, and how close the cut comes to corners.
+///
+/// # Errors
+/// A point near which the surface passes through itself, the plane comes too close to a corner, or the cut would leave the cell in
+/// one piece. What may have been cut then is to be undone.
+pub fn cut(complex: &mut Complex, cell: &[Side], cut: &Cut) -> Result<([Vec<Side>; 2], f64), Vector64<3>> {
+    let halves = complex.cut(cell, &cut.plane, cut.near.as_ref())?;
+    let cells = match halves.others {
+        Some(others) => joined(complex, halves.cells, others).ok_or(halves.middle)?,
+        None => halves.cells,
+    };
+    Ok((cells, halves.shortest))
+}
+
 /// What is connected with what is just below a cut, and with what is just above it: both, with the cell's other faces. None if both
 /// are connected with each other, or it is not clear which has a cavity.
-pub fn joined(complex: &Complex, both: [Vec<Side>; 2], others: Vec<Side>) -> Option<[Vec<Side>; 2]> {
+fn joined(complex: &Complex, both: [Vec<Side>; 2], others: Vec<Side>) -> Option<[Vec<Side>; 2]> {
     let (below, above) = (both[0].len(), both[0].len() + both[1].len());
     let faces: Vec<Side> = both.into_iter().flatten().chain(others).collect();
     let mut edges: Vec<([u32; 2], usize)> = Vec::with_capacity(3 * faces.len());
@@ -249,8 +263,8 @@ pub fn notches(complex: &Complex, cell: &[Side]) -> Vec<Notch> {
     found
 }
 
-/// Cuts beside so many of a cell's notches: through the middle of each face there, straight into the solid.
-pub fn notch_cuts(complex: &Complex, cell: &[Side], notches: &[Notch], count: usize) -> Vec<Cut> {
+/// Cuts beside so many of a cell's notches: through each face there, so far along it, straight into the solid.
+pub fn notch_cuts(complex: &Complex, cell: &[Side], notches: &[Notch], count: usize, share: f64) -> Vec<Cut> {
     let sharpest = notches.iter().map(|notch| notch.weight).fold(0.0, f64::max);
     let sharp: Vec<&Notch> = notches.iter().filter(|notch| notch.weight > 0.5 * sharpest).collect();
     let count = count.min(sharp.len());
@@ -264,7 +278,7 @@ pub fn notch_cuts(complex: &Complex, cell: &[Side], notches: &[Notch], count: us
             };
             let heights = || complex.corners(cell[face].0).into_iter().map(|c| normal.dot(&complex.points[c as usize]));
             let (low, high) = heights().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-            let plane = Plane { normal, offset: (low + high) / 2.0 };
+            let plane = Plane { normal, offset: low + (high - low) * share };
             let near = (from + to) / 2.0;
             let near = near + normal * (plane.offset - normal.dot(&near));
             found.push(Cut { plane, near: Some(near), score: notch.weight });

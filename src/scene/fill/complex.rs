@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use super::kernel::Plane;
-use super::{LEAST, cells, section};
+use super::{LEAST, section};
 use crate::geometry::Vector64;
 use crate::mesh::UnionFind;
 
@@ -39,6 +39,10 @@ pub struct Complex {
 pub struct Halves {
     /// Below and above.
     pub cells: [Vec<Side>; 2],
+    /// The cell's other faces, if only a part of the section was cut: then those below and above are next to it alone.
+    pub others: Option<Vec<Side>>,
+    /// A point of the section.
+    pub middle: Vector64<3>,
     /// The shortest side of the section, or how close its plane comes to a corner beside it.
     pub shortest: f64,
 }
@@ -100,7 +104,15 @@ impl Complex {
         found
     }
 
-    /// The same, counterclockwise as seen from outside the cell.
+    /// The corners of all of a cell's faces.
+    pub fn corners_of(&self, cell: &[Side]) -> Vec<u32> {
+        let mut corners: Vec<u32> = cell.iter().flat_map(|&(face, _)| self.corners(face)).collect();
+        corners.sort_unstable();
+        corners.dedup();
+        corners
+    }
+
+    /// A face's corners as they are by now, counterclockwise as seen from outside the cell.
     pub fn corners_outward(&self, (face, positive): Side) -> Vec<u32> {
         let mut corners = self.corners(face);
         if positive {
@@ -112,8 +124,7 @@ impl Complex {
     /// Cuts a cell by a plane, or only where the part of its section next to `near` is: what is below, and what is above.
     ///
     /// # Errors
-    /// A point near which the surface passes through itself, or the plane comes too close to a corner, or where the cut would
-    /// leave the cell in one piece; [`Complex::undo`] what may have been cut then.
+    /// A point near which the surface passes through itself, or the plane comes too close to a corner.
     pub fn cut(&mut self, cell: &[Side], by: &Plane, near: Option<&Vector64<3>>) -> Result<Halves, Vector64<3>> {
         let mut parts: [Vec<Side>; 2] = Default::default();
         let mut crossed: Vec<(Side, Vec<u32>)> = Vec::new();
@@ -172,6 +183,7 @@ impl Complex {
         }
 
         let first = self.points.len() as u32;
+        let middle = middles.first().copied().unwrap_or_default();
         self.points.extend(&middles);
         for ((edge, middle), _) in edges.into_iter().zip(first..).zip(&wanted).filter(|(_, wanted)| **wanted) {
             self.middles.insert(key(edge), middle);
@@ -208,10 +220,7 @@ impl Complex {
             parts[0].push((face, false));
             parts[1].push((face, true));
         }
-        if !whole {
-            parts = cells::joined(self, parts, others).ok_or(middles[0])?;
-        }
-        Ok(Halves { cells: parts, shortest })
+        Ok(Halves { cells: parts, others: (!whole).then_some(others), middle, shortest })
     }
 
     /// How far all is, for [`Complex::undo`].

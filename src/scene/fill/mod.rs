@@ -3,7 +3,7 @@
 //! A solid that some point inside sees all of, such as every convex one, is cut into one tetrahedron a triangle by joining
 //! its triangles to that point ([`kernel`]). Any other is cut in two by a plane, far from corners, and the section
 //! is filled with triangles that both halves share ([`complex`], [`section`]); and so on with the halves. Of several planes that
-//! is taken whose halves promise the fewest pieces ([`cells`]). Cuts go through triangles of the surface too: these are divided, never moved, and its own vertices stay where
+//! is taken whose halves promise the fewest pieces ([`choice`]). Cuts go through triangles of the surface too: these are divided, never moved, and its own vertices stay where
 //! they are.
 //!
 //! Nothing here asks whether four points lie in one plane. The corners of flat faces do but for their last digit, once a body
@@ -19,7 +19,9 @@
 //! A surface that is open has no inside and is refused, and so is one that passes through itself, as bodies that overlap do
 //! ([`crossings`]).
 
+mod apex;
 mod cells;
+mod choice;
 mod complex;
 mod crossings;
 mod kernel;
@@ -31,9 +33,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Matrix3;
 
-use self::cells::{Cut, winding};
+use self::apex::{Apex, apex};
+use self::choice::{MOST_TRIED, best_cut};
 use self::complex::{Complex, Side};
-use self::kernel::{Deepest, Plane, deepest};
 use crate::geometry::Vector64;
 use crate::mesh::facets::sort_with_parity;
 use crate::mesh::topology::{corners, enclosed_volume, facet_pairs};
@@ -93,45 +95,96 @@ pub fn fill(
              an object of its own, or write caps: false for walls only"
         )));
     }
-    let (mut complex, whole) = Complex::new(near, &triangles);
-    let own = points.len() as u32;
-    let crossed = |point: Vector64<3>| {
-        let [x, y, z] = frame.outwards(&point).into();
-        format!(
-            "passes through itself, or is too thin for single precision, near ({x:.6}, {y:.6}, {z:.6}); repair it, or \
-             write caps: false for walls only"
-        )
-    };
     let tries = (MOST_TRIED / triangles.len()).clamp(3, 9);
+    let mut best: Option<((usize, usize), Solid)> = None;
+    let mut trouble = None;
+    // The plain way is fast, and often enough as good.
+    for tries in [0, tries] {
+        match in_cells(&near, &triangles, tries, progress) {
+            Err(Stopped::Cancelled) => return Err(Unfilled::Cancelled),
+            Err(Stopped::At(near)) => trouble = trouble.or(Some(near)),
+            Ok((inner, tetrahedra)) => {
+                let (used, tetrahedra) = super::lattice::compact(tetrahedra);
+                let place = |i: u32| match points.get(i as usize) {
+                    Some(point) => *point,
+                    None => frame.outwards(&inner[i as usize]),
+                };
+                let places: Vec<Vector64<3>> = used.into_iter().map(place).collect();
+                let order = (folded(&places, &tetrahedra), tetrahedra.len());
+                if best.as_ref().is_none_or(|(least, _)| order < *least) {
+                    best = Some((order, (places, tetrahedra)));
+                }
+            }
+        }
+        if best.as_ref().is_some_and(|((folded, count), _)| *folded == 0 && *count <= FEW * triangles.len()) {
+            break;
+        }
+    }
+    match (best, trouble) {
+        (Some((_, (_, tetrahedra))), _) if tetrahedra.is_empty() => Err(nothing().into()),
+        (Some((_, solid)), _) => Ok(solid),
+        (None, near) => {
+            let [x, y, z] = frame.outwards(&near.unwrap_or_default()).into();
+            let message = format!(
+                "passes through itself, or is too thin for single precision, near ({x:.6}, {y:.6}, {z:.6}); repair it, or \
+                 write caps: false for walls only"
+            );
+            Err(message.into())
+        }
+    }
+}
+
+/// Points and tetrahedra.
+type Solid = (Vec<Vector64<3>>, Vec<[u32; 4]>);
+
+/// So many tetrahedra a triangle are few.
+const FEW: usize = 4;
+
+/// How many tetrahedra have no volume left once their corners are rounded to single precision.
+fn folded(points: &[Vector64<3>], tetrahedra: &[[u32; 4]]) -> usize {
+    let rounded = |i: u32| points[i as usize].map(|x| f64::from(x as f32));
+    let volume = |tetrahedron: &&[u32; 4]| {
+        let [a, b, c, d] = tetrahedron.map(rounded);
+        (b - a).cross(&(c - a)).dot(&(d - a))
+    };
+    tetrahedra.iter().filter(|tetrahedron| volume(tetrahedron) <= 0.0).count()
+}
+
+/// Why there are no cells.
+enum Stopped {
+    Cancelled,
+    /// A point near which no cut is possible.
+    At(Vector64<3>),
+}
+
+/// The solid in tetrahedra, where so many cuts of a cell are tried; the points' own come first.
+fn in_cells(
+    points: &[Vector64<3>],
+    triangles: &[[u32; 3]],
+    tries: usize,
+    progress: &dyn Progress,
+) -> Result<Solid, Stopped> {
+    let (mut complex, whole) = Complex::new(points.to_vec(), triangles);
+    let own = points.len() as u32;
     let mut leaves: Vec<(Vec<Side>, Apex)> = Vec::new();
     let mut open: Vec<(Vec<Side>, u32)> = vec![(whole, 0)];
     while let Some((cell, cuts)) = open.pop() {
         let cell = complex.resolve(&cell);
         for part in cells::parts(&complex, cell) {
             if progress.cancelled() {
-                return Err(Unfilled::Cancelled);
+                return Err(Stopped::Cancelled);
             }
-            let corners = corners_of(&complex, &part);
+            let corners = complex.corners_of(&part);
             if let Some(apex) = apex(&complex, &part, &corners, own, cuts) {
                 leaves.push((part, apex));
                 continue;
             }
-            match best_cut(&mut complex, &part, &corners, own, cuts, tries, progress) {
-                Ok(cells) => open.extend(cells.into_iter().rev().map(|cell| (cell, cuts + 1))),
-                Err(trouble) => return Err(crossed(trouble).into()),
-            }
+            let halves = best_cut(&mut complex, &part, &corners, own, cuts, tries, progress).map_err(Stopped::At)?;
+            open.extend(halves.into_iter().rev().map(|cell| (cell, cuts + 1)));
         }
     }
-    let tetrahedra = tetrahedra(&mut complex, leaves).map_err(crossed)?;
-    if tetrahedra.is_empty() {
-        return Err(nothing().into());
-    }
-    let (used, tetrahedra) = super::lattice::compact(tetrahedra);
-    let points = used.into_iter().map(|i| match points.get(i as usize) {
-        Some(point) => *point,
-        None => frame.outwards(&complex.points[i as usize]),
-    });
-    Ok((points.collect(), tetrahedra))
+    let tetrahedra = tetrahedra(&mut complex, leaves);
+    Ok((complex.points, tetrahedra))
 }
 
 /// The triangles without those that lie on each other and face opposite ways, as where two bodies touch.
@@ -218,133 +271,8 @@ fn outward(points: &[Vector64<3>], triangles: Vec<[u32; 3]>) -> Result<Vec<[u32;
     Ok(triangles)
 }
 
-fn corners_of(complex: &Complex, cell: &[Side]) -> Vec<u32> {
-    let mut corners: Vec<u32> = cell.iter().flat_map(|&(face, _)| complex.corners(face)).collect();
-    corners.sort_unstable();
-    corners.dedup();
-    corners
-}
-
-/// What a cell's faces are joined to.
-enum Apex {
-    /// A point inside.
-    Inside(Vector64<3>),
-    /// A corner, which sees all faces that it is not part of.
-    Corner(u32),
-}
-
-/// A point that sees all of a cell from well above each face; none if the cell is better cut first.
-fn apex(complex: &Complex, cell: &[Side], corners: &[u32], own: u32, cuts: u32) -> Option<Apex> {
-    let planes: Vec<Plane> =
-        cell.iter().map(|&side| complex.plane(side)).filter(|plane| plane.normal.amax() > 0.0).collect();
-    let points = || corners.iter().map(|&i| complex.points[i as usize]);
-    let low = points().fold(Vector64::repeat(f64::INFINITY), |low: Vector64<3>, p| low.inf(&p));
-    let high = points().fold(Vector64::repeat(f64::NEG_INFINITY), |high: Vector64<3>, p| high.sup(&p));
-    let (center, radius) = ((low + high) / 2.0, (high - low).norm() / 2.0);
-    // What is thin has no deep point. The wider a cell is than its kernel is deep, the more a cut may better it; after many
-    // cuts it is as good as it gets.
-    let share = 0.05 * 0.5f64.powi(cuts.saturating_sub(30).min(60) as i32);
-    if let Some(Deepest { point, depth, limits }) = deepest(&planes, &center, radius, LEAST) {
-        let width = |n: &Vector64<3>| {
-            let heights = points().map(|p| n.dot(&p));
-            let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-            high - low
-        };
-        let width = limits.iter().map(width).fold(f64::INFINITY, f64::min);
-        if depth >= share * width && winding(complex, cell, &point) == 1 {
-            return Some(Apex::Inside(point));
-        }
-    }
-    if cell.len() > 60 {
-        return None;
-    }
-    let sees = |&corner: &u32| {
-        let point = complex.points[corner as usize];
-        let height = |&side: &Side| match complex.corners(side.0).contains(&corner) {
-            true => f64::INFINITY,
-            false => complex.plane(side).offset - complex.plane(side).normal.dot(&point),
-        };
-        cell.iter().map(height).fold(f64::INFINITY, f64::min) >= (share * radius).max(LEAST)
-    };
-    corners.iter().copied().filter(|&corner| corner < own).find(sees).map(Apex::Corner)
-}
-
-/// How many faces are looked at for all cuts tried of a solid, about; of a cell, some of these.
-const MOST_TRIED: usize = 100_000;
-const MOST_TRIED_OF_CELL: usize = 5_000;
-
-/// What is narrower is avoided, even at the cost of more pieces.
-const NARROW: f64 = 1e-4;
-
-/// What a notch is expected to cost, in faces.
-const NOTCH: f64 = 1.0;
-
-/// Cuts a cell where the pieces promise to become the fewest.
-///
-/// # Errors
-/// A point near which no cut is possible.
-fn best_cut(
-    complex: &mut Complex,
-    cell: &[Side],
-    corners: &[u32],
-    own: u32,
-    cuts: u32,
-    tries: usize,
-    progress: &dyn Progress,
-) -> Result<Vec<Vec<Side>>, Vector64<3>> {
-    let across = cells::cuts(complex, cell, corners, 2.0 * LEAST);
-    let tries = (MOST_TRIED_OF_CELL / cell.len()).clamp(3, tries);
-    let notches = cells::notches(complex, cell);
-    let mut tried: Vec<Cut> = cells::notch_cuts(complex, cell, &notches, tries / 3);
-    tried.extend(across.iter().take(tries - 2 * (tries / 3)));
-    let mut best: Option<(f64, Cut)> = None;
-    let mut trouble = complex.points[corners[0] as usize];
-    for cut in tried {
-        if progress.cancelled() {
-            break;
-        }
-        let mark = complex.mark();
-        match complex.cut(cell, &cut.plane, cut.near.as_ref()) {
-            Ok(halves) => {
-                let (mut cost, mut done) = (0.0, true);
-                for half in halves.cells {
-                    for part in cells::parts(complex, complex.resolve(&half)) {
-                        let faces = part.len() as f64;
-                        let corners = corners_of(complex, &part);
-                        cost += faces;
-                        if apex(complex, &part, &corners, own, cuts + 1).is_none() {
-                            done = false;
-                            let weight: f64 = cells::notches(complex, &part).iter().map(|notch| notch.weight).sum();
-                            cost += NOTCH * weight * (2.0 + weight).log2() + 10.0;
-                        }
-                    }
-                }
-                cost *= 1.0 + NARROW / halves.shortest;
-                if best.is_none_or(|(least, _)| cost < least) {
-                    best = Some((cost, cut));
-                }
-                if done && cost < 2.0 * cell.len() as f64 {
-                    complex.undo(mark);
-                    break;
-                }
-            }
-            Err(near) => trouble = near,
-        }
-        complex.undo(mark);
-    }
-    for cut in best.map(|(_, cut)| cut).into_iter().chain(across) {
-        let mark = complex.mark();
-        match complex.cut(cell, &cut.plane, cut.near.as_ref()) {
-            Ok(halves) => return Ok(halves.cells.into()),
-            Err(near) => trouble = near,
-        }
-        complex.undo(mark);
-    }
-    Err(trouble)
-}
-
 /// Joins the faces of each cell to its apex.
-fn tetrahedra(complex: &mut Complex, leaves: Vec<(Vec<Side>, Apex)>) -> Result<Vec<[u32; 4]>, Vector64<3>> {
+fn tetrahedra(complex: &mut Complex, leaves: Vec<(Vec<Side>, Apex)>) -> Vec<[u32; 4]> {
     let mut cut: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
     let mut found = Vec::new();
     for (cell, apex) in leaves {
@@ -370,5 +298,5 @@ fn tetrahedra(complex: &mut Complex, leaves: Vec<(Vec<Side>, Apex)>) -> Result<V
             }
         }
     }
-    Ok(found)
+    found
 }
