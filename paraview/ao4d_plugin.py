@@ -878,10 +878,24 @@ def hand_on(source, mesh):
 def show_colours_as_they_are():
     """Pictures have colours already; ParaView would put its colour map in their place. Only the client knows representations."""
     try:
+        from paraview import servermanager, simple
         from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager
     except ImportError:
         return
     known = set()
+
+    def show_as_it_is(representation, source):
+        colours, opacity = simple.GetColorTransferFunction("rgba"), simple.GetOpacityTransferFunction("rgba")
+        colours.AutomaticRescaleRangeMode = "Never"
+        colours.RescaleTransferFunction(0, 255)
+        opacity.Points = [0, 0, 0.5, 0, 255, 1, 0.5, 0]
+        representation.LookupTable, representation.ScalarOpacityFunction = colours, opacity
+        representation.ColorArrayName = ["POINTS", "rgba"]
+        representation.MapScalars = 0
+        bounds, extent = source.GetDataInformation(0).GetBounds(), source.GetDataInformation(0).GetExtent()
+        width, cells = bounds[1] - bounds[0], extent[1] - extent[0]
+        if width > 0 and cells > 0:
+            representation.ScalarOpacityUnitDistance = width / cells
 
     def registered(manager, event):
         session = manager.GetActiveSessionProxyManager()
@@ -891,10 +905,7 @@ def show_colours_as_they_are():
             if not source or proxy.GetGlobalIDAsString() in known or source.GetXMLName() not in ("ao4dPicture", "ao4dFilm"):
                 continue
             known.add(proxy.GetGlobalIDAsString())
-            mapped = proxy.GetProperty("MapScalars")
-            if mapped:
-                mapped.SetElement(0, 0)
-                proxy.UpdateVTKObjects()
+            show_as_it_is(servermanager._getPyProxy(proxy), source)
 
     manager = vtkSMProxyManager.GetProxyManager() if vtkSMProxyManager.IsInitialized() else None
     if manager:

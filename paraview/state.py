@@ -757,7 +757,7 @@ def make_film(stem):
     film, unfinished = stem + '.mp4', stem + '.partial.mp4'
     command = ['ffmpeg', '-y', '-loglevel', 'error', '-framerate', repr(RATE),
                '-i', stem.replace('%', '%%') + '_%04d.png', '-frames:v', str(FRAMES),
-               '-vf', 'pad=ceil(iw/2)*2:ceil(ih/2)*2', '-pix_fmt', 'yuv420p']
+               '-vf', 'pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white', '-pix_fmt', 'yuv420p']
     if shutil.which('ffmpeg') is None:
         print('ffmpeg is not installed; with it, this makes a film of the frames:')
         print('  ' + ' '.join("'%s'" % part.replace("'", "'\\''") for part in command + [film]))

@@ -14,7 +14,7 @@ mod meshes;
 use std::sync::Arc;
 use std::time::Instant;
 
-use ao4d::accel::{Leaf, Node, Tracer, WideNode};
+use ao4d::accel::{Node, Tracer};
 use ao4d::geometry::{Vector, Vector64};
 use ao4d::mesh::{MeshBuilder, Orientation, Surface};
 use rustix::time::{ClockId, clock_gettime};
@@ -57,8 +57,8 @@ fn row<const D: usize>(name: &str) {
                 best.iter_mut().zip(found).for_each(|(best, found)| *best = best.min(found));
                 memory = [
                     tracer.bvh().nodes.len() * size_of::<Node<D>>() + 4 * tracer.bvh().order.len(),
-                    tracer.wide().nodes.len() * size_of::<WideNode<D>>(),
-                    tracer.wide().leaves.len() * size_of::<Leaf<D>>(),
+                    tracer.wide().bytes()[0],
+                    tracer.wide().bytes()[1],
                 ];
             }
             let [tree, tree_cpu, wide, wide_cpu] = best;

@@ -171,7 +171,7 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
             ratios.push(ours.rate / theirs.rate);
             print!("  {:7.2} {:.5}  {:5.2}", theirs.rate, theirs.mean, ours.rate / theirs.rate);
         }
-        println!("   build {build:.2}+{collapse:.2} s, {} nodes {} leaves", wide.nodes.len(), wide.leaves.len());
+        println!("   build {build:.2}+{collapse:.2} s, {} nodes {} leaves", wide.nodes, wide.leaves);
     }
     ratios
 }

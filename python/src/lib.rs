@@ -200,7 +200,7 @@ fn check(py: Python<'_>, text: Option<&str>, path: &str, sets: Vec<String>) -> P
 
 fn tolerance((atol, rtol, max_different): (f64, f64, usize), arrays: Vec<String>) -> PyResult<Tolerance> {
     if [atol, rtol].iter().all(|x| x.is_finite() && *x >= 0.0) {
-        return Ok(Tolerance { atol, rtol, max_different, arrays });
+        return Ok(Tolerance { atol, rtol, max_different, arrays, ..Tolerance::default() });
     }
     Err(PyValueError::new_err("atol, rtol: expected numbers, 0 or above"))
 }

@@ -217,7 +217,7 @@ def test_other_threads_run():
     ticker = threading.Thread(target=tick)
     ticker.start()
     began = time.monotonic()
-    ao4d.occlusion(mesh, samples=2048)
+    ao4d.occlusion(mesh, samples=768)
     took = time.monotonic() - began
     stop.set()
     ticker.join()
@@ -263,6 +263,15 @@ def test_what_is_typed_is_there():
         if not name.startswith("__"):
             assert f"def {name}(" in stub or f"class {name}" in stub, f"{name} has no type"
     assert all(hasattr(ao4d, name) for name in ao4d.__all__)
+
+
+def test_the_reference_has_every_key():
+    docs = Path(__file__).parents[2] / "docs"
+    names = {}
+    exec((docs / "reference.py").read_text(), names)
+    page = (docs / "reference.md").read_text()
+    assert page == names["page"](ao4d.schema()), "run: ao4d schema | python3 docs/reference.py > docs/reference.md"
+    assert page.count("## ") > 40 and "Spec" not in "".join(line for line in page.splitlines() if line.startswith("## "))
 
 
 if __name__ == "__main__":

@@ -4,14 +4,20 @@
 mod apart;
 mod build;
 mod bvh;
+mod lines;
 mod node;
 mod overlap;
 mod passages;
+mod rows;
+mod scale;
 mod tracer;
 mod wide;
 
 pub use bvh::Bvh;
+pub use lines::{Row, WIDTH};
 pub use node::Node;
 pub use passages::{Candidate, Passage, Wanted};
+pub use rows::{BOTTOM, LEAF, Leaf, NODE, Reference, WideNode, place};
+pub use scale::Scale;
 pub use tracer::{Hit, Tracer};
-pub use wide::{Leaf, Scale, TAG_BITS, WIDTH, WideBvh, WideNode};
+pub use wide::WideBvh;

@@ -15,7 +15,7 @@ use super::{Failure, Outcome};
 pub struct Check {
     #[command(flatten)]
     options: PipelineOptions,
-    /// Print the plan as JSON
+    /// Print the plans as JSON: {"pipelines": [...]}
     #[arg(long)]
     json: bool,
 }
@@ -29,6 +29,7 @@ impl Check {
         let watch = Watch::new(console)?;
         let progress: &dyn Progress = &watch;
         let pool = settings.pool().map_err(RunError::Threads)?;
+        let mut described = Vec::new();
         for pipeline in &pipelines {
             let running = progress.stage("reading inputs", 0);
             let prepared = pool.install(|| pipeline.prepare_watched(|_| true, progress));
@@ -37,10 +38,17 @@ impl Check {
                 return Err(Failure::Cancelled);
             }
             let prepared = prepared?;
-            prepared.notes.iter().flatten().for_each(|note| console.note(&format!("note: {note}")));
+            prepared.notes.iter().flatten().for_each(|note| console.note(note));
             let counts = prepared.counts();
             let description = pipeline.plan.describe(&counts);
-            if self.json { console.json(&description) } else { console.result(&description.to_string()) }?;
+            if self.json {
+                described.push(serde_json::to_value(&description).map_err(|e| Failure::Failed(Box::new(e)))?);
+            } else {
+                console.result(&description.to_string())?;
+            }
+        }
+        if self.json {
+            console.pipelines(&described)?;
         }
         Ok(Outcome::Done)
     }

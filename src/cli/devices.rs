@@ -131,7 +131,7 @@ fn processor() -> Processor {
 }
 
 #[cfg(target_arch = "x86_64")]
-fn features() -> Vec<&'static str> {
+pub fn features() -> Vec<&'static str> {
     let found = [
         ("sse4.2", is_x86_feature_detected!("sse4.2")),
         ("avx", is_x86_feature_detected!("avx")),
@@ -143,6 +143,6 @@ fn features() -> Vec<&'static str> {
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn features() -> Vec<&'static str> {
+pub fn features() -> Vec<&'static str> {
     Vec::new()
 }

@@ -35,7 +35,7 @@ impl Info {
         super::existing(&self.file)?;
         if self.pipeline {
             let told = Told::read(&self.file)?;
-            told.notes.iter().for_each(|note| console.note(&format!("warning: {}: {note}", self.file.display())));
+            told.notes.iter().for_each(|note| console.warn(&format!("{}: {note}", self.file.display())));
             console.result(&told.text)?;
             return Ok(Outcome::Done);
         }

@@ -29,16 +29,14 @@ impl Merge {
         let mut reports = Vec::with_capacity(pipelines.len());
         for pipeline in &pipelines {
             let report = merge(pipeline, self.pieces, &settings, &watch)?;
-            report.notes.iter().for_each(|note| console.note(&format!("note: {note}")));
+            report.notes.iter().for_each(|note| console.note(note));
             if !self.json {
                 console.result(&report.to_string())?;
             }
             reports.push(report);
         }
-        match &reports[..] {
-            [one] if self.json => console.json(one)?,
-            _ if self.json => console.json(&reports)?,
-            _ => {}
+        if self.json {
+            console.pipelines(&reports)?;
         }
         Ok(Outcome::Done)
     }

@@ -5,21 +5,28 @@
 
 mod check;
 mod compare;
+mod completions;
 mod console;
 mod devices;
+mod example;
 mod info;
+mod man;
 mod merge;
 mod options;
+mod page;
 mod piece;
 mod run;
 mod schema;
 mod study;
+mod version;
 mod watch;
 
 use std::borrow::Cow;
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::Path;
 
+use ao4d::io::AtomicFile;
 use ao4d::pipeline::RunError;
 use ao4d::text::for_terminal;
 use clap::{Parser, Subcommand};
@@ -47,7 +54,7 @@ enum Verb {
     Check(check::Check),
     /// Measure error against time of the occlusion methods on a pipeline's scene
     Study(study::Study),
-    /// Compare two volumes, meshes or occlusion files
+    /// Compare two volumes, meshes or occlusion files, or two folders of them
     Compare(compare::Compare),
     /// Tell what a file holds
     Info(info::Info),
@@ -55,6 +62,14 @@ enum Verb {
     Devices(devices::Devices),
     /// Print the JSON Schema of a pipeline, for editors
     Schema(schema::Schema),
+    /// Run a pipeline and put what it shows into one HTML file, for any browser
+    Page(page::Page),
+    /// Write one of the shipped pipelines, with what it reads; or list them
+    Example(example::Example),
+    /// Print what a shell needs to complete commands and options
+    Completions(completions::Completions),
+    /// Print a manual page, or write all of them
+    Man(man::Man),
 }
 
 /// How a verb ended well.
@@ -114,11 +129,32 @@ fn existing(file: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Writes a file, which appears when it is whole.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let written = AtomicFile::create(path).and_then(|mut file| {
+        file.write_all(bytes).map_err(|cause| AtomicFile::name_in(path)(cause.into()))?;
+        file.commit()
+    });
+    written.map(|_| ()).map_err(|e| Failure::Failed(Box::new(e)))
+}
+
+/// Whether the command line asks for the version, and for more about it; clap answers to the first alone at once.
+fn asks_for_details(arguments: &[OsString]) -> bool {
+    let any = |words: &[&str]| arguments.iter().any(|a| words.iter().any(|word| a == word));
+    let only = |a: &OsString| ["--version", "-V", "--verbose", "-v", "-Vv", "-vV"].iter().any(|word| a == word);
+    let both = any(&["--version", "-V"]) && any(&["--verbose", "-v"]) || any(&["-Vv", "-vV"]);
+    both && arguments.iter().all(only)
+}
+
 /// Parses the command line, does what it says, and returns the exit code.
 ///
 /// The first argument is the program's own name. Whoever embeds the program, such as its Python package, hands the rest in.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
+    if asks_for_details(arguments.get(1..).unwrap_or_default()) {
+        let messages = Messages { quiet: false, verbose: true, log_level: None, progress: None };
+        return version::print(&Console::new(messages)).map_or(3, |_| 0);
+    }
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(refusal) => {
@@ -143,6 +179,10 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Verb::Info(info) => info.execute(&console),
         Verb::Devices(devices) => devices.execute(&console),
         Verb::Schema(schema) => schema.execute(&console),
+        Verb::Page(page) => page.execute(&console),
+        Verb::Example(example) => example.execute(&console),
+        Verb::Completions(completions) => completions.execute(&console),
+        Verb::Man(man) => man.execute(&console),
     };
     match result {
         Ok(Outcome::Done) => 0,

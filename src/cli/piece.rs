@@ -32,7 +32,7 @@ impl PieceOptions {
             None => {
                 let variable = |name: &str| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned());
                 let Launched { piece, note } = Launched::from_environment(variable).map_err(Failure::refused)?;
-                note.iter().for_each(|note| console.note(&format!("note: {note}")));
+                note.iter().for_each(|note| console.note(note));
                 Ok(piece)
             }
         }

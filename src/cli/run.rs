@@ -3,8 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use ao4d::pipeline::{Pipeline, RunError, run};
+use ao4d::pipeline::{Pipeline, RunError, Shared, run, run_sharing};
 use ao4d::progress::Progress;
+use ao4d::stages::Keys;
+use ao4d::stages::occlusion::OcclusionPlan;
 use clap::Args;
 
 use super::console::Console;
@@ -20,12 +22,17 @@ pub struct Run {
     options: PipelineOptions,
     #[command(flatten)]
     piece: PieceOptions,
-    /// Print the summary as JSON
+    /// Print the summaries as JSON: {"pipelines": [...]}
     #[arg(long)]
     json: bool,
 }
 
 impl Run {
+    /// Lets pipelines that make no page make one.
+    pub fn with_page(&mut self) {
+        self.options.page = true;
+    }
+
     pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
         let piece = self.piece.piece(console)?;
         let (mut pipelines, settings) = self.options.load_all(console)?;
@@ -41,24 +48,33 @@ impl Run {
             checked?;
         }
         let mut reports = Vec::with_capacity(pipelines.len());
-        for pipeline in &pipelines {
-            let report = run(pipeline, &settings, &watch).map_err(|error| match error {
+        let mut shared = Shared::default();
+        for (i, pipeline) in pipelines.iter().enumerate() {
+            // Those of a sweep stand together.
+            let same = |other: Option<&Pipeline>| other.is_some_and(|p| p.document.file() == pipeline.document.file());
+            let [before, after] = [i.checked_sub(1).and_then(|i| pipelines.get(i)), pipelines.get(i + 1)].map(same);
+            if !before {
+                shared = Shared::default();
+            }
+            let ran = match before || after {
+                true => run_sharing(pipeline, &settings, &watch, &mut shared),
+                false => run(pipeline, &settings, &watch),
+            };
+            let report = ran.map_err(|error| match error {
                 // Others have left their files by now.
                 RunError::Refused(error) if !reports.is_empty() => Failure::Failed(Box::new(error)),
                 error => error.into(),
             })?;
             for note in &report.notes {
-                console.note(&format!("note: {note}"));
+                console.note(note);
             }
             if !self.json {
                 console.result(&report.to_string())?;
             }
             reports.push(report);
         }
-        match &reports[..] {
-            [one] if self.json => console.json(one)?,
-            _ if self.json => console.json(&reports)?,
-            _ => {}
+        if self.json {
+            console.pipelines(&reports)?;
         }
         Ok(Outcome::Done)
     }
@@ -69,13 +85,24 @@ impl Run {
 fn check_together(pipelines: &[Pipeline], progress: &dyn Progress) -> Result<(), ao4d::pipeline::Error> {
     let _running = progress.stage("reading inputs", 0);
     let mut written = BTreeSet::new();
+    let mut built = BTreeSet::new();
     for pipeline in pipelines {
         let plan = &pipeline.plan;
         let reads_those = |stage: usize| plan.input_files(stage).iter().any(|file| written.contains(&place(file)));
         let later: Vec<bool> = (0..plan.stages.len())
             .map(|stage| reads_those(stage) || plan.scene_of(stage).is_some_and(|scene| reads_those(scene.index())))
             .collect();
-        pipeline.prepare_watched(|stage| !later[stage], progress)?;
+        // Scenes that were built are as they were. Files of values are held against them, so those build them again.
+        let keys = Keys::new(plan);
+        let loads = plan.all::<OcclusionPlan>().any(|(_, occlusion)| occlusion.is_loaded());
+        let known = |stage: usize| match plan.scene_of(stage) {
+            Some(scene) => !loads && built.contains(keys.of(scene.index())),
+            None => false,
+        };
+        pipeline.prepare_watched(|stage| !later[stage] && !known(stage), progress)?;
+        let scenes = (0..plan.stages.len()).filter(|&stage| !later[stage]).filter_map(|stage| plan.scene_of(stage));
+        let scenes: Vec<String> = scenes.map(|scene| keys.of(scene.index()).to_owned()).collect();
+        built.extend(scenes);
         let files = (0..plan.stages.len()).flat_map(|stage| plan.all_files_of(stage));
         written.extend(files.map(|file| place(&plan.out.join(file))));
     }

@@ -25,7 +25,7 @@ impl Study {
         let study = study(&pipeline, &settings, &watch)?;
         console.result(&study.markdown())?;
         for file in &study.files {
-            console.note(&format!("written: {}", file.display()));
+            console.tell(&format!("written: {}", file.display()));
         }
         Ok(Outcome::Done)
     }

@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 use ao4d::progress::Progress;
 use ao4d::text::for_terminal;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
 
 use super::Failure;
 use super::console::{self, Console};
+use super::options::Form;
 
 /// Reports to the console, and knows whether Ctrl-C was pressed.
 pub struct Watch<'a> {
@@ -21,10 +23,17 @@ pub struct Watch<'a> {
 /// How long work has to hear Ctrl-C by itself, as nearly all does.
 const PATIENCE: Duration = Duration::from_millis(600);
 
+/// Events of work that goes on are told no more often than this.
+const PACE: Duration = Duration::from_millis(200);
+
 struct Current {
     stage: String,
     began: Instant,
     bar: ProgressBar,
+    total: u64,
+    done: u64,
+    /// When it was told last.
+    told: Instant,
 }
 
 impl<'a> Watch<'a> {
@@ -72,7 +81,7 @@ pub fn tell_interrupted(quiet: bool) {
     static TOLD: Once = Once::new();
     TOLD.call_once(|| {
         if !quiet {
-            console::to_stderr("interrupted");
+            console::say_interrupted();
         }
     });
 }
@@ -80,20 +89,32 @@ pub fn tell_interrupted(quiet: bool) {
 impl Progress for Watch<'_> {
     fn begin(&self, stage: &str, total: u64) {
         let bar = if self.console.bars() { bar(stage, total) } else { ProgressBar::hidden() };
-        *self.current() = Some(Current { stage: stage.to_owned(), began: Instant::now(), bar });
+        if self.console.form() == Form::Json {
+            self.console.event(&json!({ "event": "begin", "stage": stage, "total": total }));
+        }
+        let began = Instant::now();
+        *self.current() = Some(Current { stage: stage.to_owned(), began, bar, total, done: 0, told: began });
     }
 
     fn advance(&self, steps: u64) {
-        if let Some(current) = self.current().as_ref() {
+        if let Some(current) = self.current().as_mut() {
             current.bar.inc(steps);
+            current.done += steps;
+            if self.console.form() == Form::Json && current.told.elapsed() >= PACE {
+                let Current { stage, done, total, .. } = &*current;
+                self.console.event(&json!({ "event": "advance", "stage": stage, "done": done, "total": total }));
+                current.told = Instant::now();
+            }
         }
     }
 
     fn end(&self) {
-        if let Some(Current { stage, began, bar }) = self.current().take() {
+        if let Some(Current { stage, began, bar, .. }) = self.current().take() {
             bar.finish_and_clear();
-            if self.console.verbose() {
-                self.console.note(&format!("{stage}: {:.2} s", began.elapsed().as_secs_f64()));
+            let seconds = began.elapsed().as_secs_f64();
+            match self.console.form() {
+                Form::Json => self.console.event(&json!({ "event": "end", "stage": stage, "seconds": seconds })),
+                _ => self.console.detail(&format!("{stage}: {seconds:.2} s")),
             }
         }
     }

@@ -6,9 +6,11 @@
 //! round. Whatever exists on one side only is a difference too, as is another grid or other cells. Field data is
 //! compared only where a text of it is asked for by its name: it says how a file was made, not what it shows.
 
+use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::io::vtk::{DataSet, Field, Image, UnstructuredGrid};
 use crate::volume::{Array, Grid, Values, Volume};
@@ -24,6 +26,27 @@ pub struct Tolerance {
     pub max_different: usize,
     /// Only these arrays are compared; all of them if there are none. One that neither side has is a difference.
     pub arrays: Vec<String>,
+    /// What holds instead for the arrays of these names.
+    pub each: BTreeMap<String, Limits>,
+    /// Files that are left out where folders are compared, by their paths or their names.
+    pub ignore: Vec<glob::Pattern>,
+}
+
+/// What two numbers of an array, and how many of them, may be apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// Absolute tolerance.
+    pub atol: f64,
+    /// Relative tolerance, times the reference's magnitude.
+    pub rtol: f64,
+    /// How many numbers of an array may differ all the same.
+    pub max_different: usize,
+}
+
+impl Limits {
+    pub(super) fn agree(&self, difference: f64, reference: f64) -> bool {
+        difference <= self.atol + self.rtol * reference.abs()
+    }
 }
 
 /// The outcome of a comparison.
@@ -67,10 +90,22 @@ pub struct Place {
     pub voxel: Option<[usize; 3]>,
     /// The component.
     pub component: usize,
-    /// The number on the first side, as text.
+    /// The number on the first side, as text; in JSON as a number, if it is one.
+    #[serde(serialize_with = "number_or_text")]
     pub a: String,
-    /// The number on the second side, as text.
+    /// The number on the second side, as text; in JSON as a number, if it is one.
+    #[serde(serialize_with = "number_or_text")]
     pub b: String,
+}
+
+/// Infinities and NaNs, which JSON has no numbers for, stay texts.
+fn number_or_text<S: Serializer>(text: &str, serializer: S) -> Result<S::Ok, S::Error> {
+    match (text.parse::<i64>(), text.parse::<u64>(), text.parse::<f64>()) {
+        (Ok(i), ..) => serializer.serialize_i64(i),
+        (_, Ok(i), _) => serializer.serialize_u64(i),
+        (.., Ok(x)) if x.is_finite() => serializer.serialize_f64(x),
+        _ => serializer.serialize_str(text),
+    }
 }
 
 /// Compares two data sets read from files.
@@ -146,12 +181,24 @@ impl Tolerance {
         self.arrays.iter().all(|name| name == array)
     }
 
-    fn takes(&self, array: &str) -> bool {
-        self.arrays.is_empty() || self.arrays.iter().any(|name| name == array)
+    /// What holds where nothing else is said.
+    pub fn limits(&self) -> Limits {
+        Limits { atol: self.atol, rtol: self.rtol, max_different: self.max_different }
     }
 
-    fn agree(&self, difference: f64, reference: f64) -> bool {
-        difference <= self.atol + self.rtol * reference.abs()
+    /// What holds for an array.
+    pub fn of(&self, array: &str) -> Limits {
+        self.each.get(array).copied().unwrap_or_else(|| self.limits())
+    }
+
+    /// Whether a file of a folder, by its path below that, is left out.
+    pub fn ignores(&self, file: &Path) -> bool {
+        let name = file.file_name().map(Path::new);
+        self.ignore.iter().any(|p| p.matches_path(file) || name.is_some_and(|name| p.matches_path(name)))
+    }
+
+    pub(super) fn takes(&self, array: &str) -> bool {
+        self.arrays.is_empty() || self.arrays.iter().any(|name| name == array)
     }
 }
 
@@ -162,7 +209,7 @@ impl Comparison {
             self.differences.push(format!("dimensions {:?} and {:?}", a.dimensions, b.dimensions));
         }
         for (what, a, b) in [("origin", a.origin, b.origin), ("spacing", a.spacing, b.spacing)] {
-            if a.iter().zip(&b).any(|(a, b)| !tolerance.agree((a - b).abs(), *b)) {
+            if a.iter().zip(&b).any(|(a, b)| !tolerance.limits().agree((a - b).abs(), *b)) {
                 self.differences.push(format!("{what} {a:?} and {b:?}"));
             }
         }
@@ -237,9 +284,10 @@ impl Comparison {
 
 /// Compares two arrays of equal length and equally many components; with a grid, places become voxels.
 fn array(a: &Array, b: &Array, grid: Option<&Grid>, tolerance: &Tolerance) -> ArrayComparison {
+    let limits = tolerance.of(&a.name);
     let mut differences = Differences::default();
-    differences.add(&a.values, &b.values, tolerance);
-    differences.finish(&a.name, a.components, grid, tolerance)
+    differences.add(&a.values, &b.values, &limits);
+    differences.finish(&a.name, a.components, grid, &limits)
 }
 
 /// A number that differs: which, and both sides as text.
@@ -259,7 +307,7 @@ pub(super) struct Differences {
 
 impl Differences {
     /// The next numbers of both.
-    pub fn add(&mut self, a: &Values, b: &Values, tolerance: &Tolerance) {
+    pub fn add(&mut self, a: &Values, b: &Values, limits: &Limits) {
         let (count, before) = (a.len().min(b.len()), self.count);
         self.count += count;
         let at = |i: usize| Some((before + i, [a.format(i), b.format(i)]));
@@ -279,7 +327,7 @@ impl Differences {
             if difference == 0.0 {
                 continue;
             }
-            self.different += usize::from(!tolerance.agree(difference, y));
+            self.different += usize::from(!limits.agree(difference, y));
             self.squares += difference * difference;
             if difference > self.largest {
                 (self.largest, self.largest_at) = (difference, at(i));
@@ -288,7 +336,7 @@ impl Differences {
     }
 
     /// What was found; with a grid, places become voxels.
-    pub fn finish(self, name: &str, components: usize, grid: Option<&Grid>, tolerance: &Tolerance) -> ArrayComparison {
+    pub fn finish(self, name: &str, components: usize, grid: Option<&Grid>, limits: &Limits) -> ArrayComparison {
         let comparable = self.count - self.incomparable;
         let place = |(i, [a, b]): (usize, [String; 2])| {
             let (index, component) = (i / components.max(1), i % components.max(1));
@@ -302,7 +350,7 @@ impl Differences {
             largest: self.largest,
             rms: if comparable == 0 { 0.0 } else { (self.squares / comparable as f64).sqrt() },
             at: self.first_incomparable.or(self.largest_at).map(place),
-            same: self.different <= tolerance.max_different,
+            same: self.different <= limits.max_different,
         }
     }
 }

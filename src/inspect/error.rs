@@ -22,6 +22,22 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
+    /// A file of tolerances that isn't one.
+    #[error("{}: expected tolerances, such as `arrays: {{rgba: {{atol: 2}}}}`: {message}", path.display())]
+    Tolerances {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A picture that can't be taken in.
+    #[error("{}: can't be read as a PNG: {message}", path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
     /// A VTK file that can't be taken in.
     #[error(transparent)]
     Vtk(#[from] vtk::Error),

@@ -67,10 +67,11 @@ impl Floats {
             let message = format!("array `{name}` has {} and {} numbers", self.left, other.left);
             return Ok(Comparison { differences: vec![message], ..Comparison::default() });
         }
+        let limits = tolerance.of(name);
         let mut differences = Differences::default();
         while self.left > 0 {
-            differences.add(&self.block()?, &other.block()?, tolerance);
+            differences.add(&self.block()?, &other.block()?, &limits);
         }
-        Ok(Comparison::of(differences.finish(name, 1, None, tolerance)))
+        Ok(Comparison::of(differences.finish(name, 1, None, &limits)))
     }
 }

@@ -18,11 +18,15 @@
 pub mod compare;
 mod error;
 mod floats;
+pub mod folders;
 pub mod image;
 mod info;
+pub mod picture;
 mod pipeline;
 mod range;
+mod reports;
 pub mod surface;
+mod tolerances;
 
 use std::path::{Path, PathBuf};
 

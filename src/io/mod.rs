@@ -21,6 +21,7 @@ pub mod image;
 mod inline;
 mod input;
 pub mod mesh;
+pub mod page;
 pub mod paraview;
 pub mod parts;
 pub mod png;
@@ -31,7 +32,7 @@ pub mod vti;
 pub mod vtk;
 pub mod vtp;
 pub mod vtu;
-mod xml;
+pub(crate) mod xml;
 
 /// The name under which files tell of the pipeline that they were made by.
 pub const PIPELINE: &str = "pipeline";

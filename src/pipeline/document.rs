@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 
 use super::error::{Error, Place, Refusal};
-use super::overrides;
-use super::yaml::{self, Node, Origin, Problem, Segment, Value};
+use super::yaml::{self, Entry, Node, Origin, Problem, Segment, Value};
+use super::{compose, overrides};
 use crate::stages::Invalid;
 
 /// Larger files are refused. A scene of that size belongs into a mesh file.
@@ -20,45 +20,114 @@ pub struct Document {
     folder: PathBuf,
     root: Node,
     sets: Vec<String>,
+    /// The files that were included, by the numbers that origins have.
+    included: Vec<PathBuf>,
+    /// What tells it from the others of its sweep.
+    swept: String,
 }
 
+/// The name that stands for standard input.
+pub const STDIN: &str = "-";
+
 impl Document {
-    /// Reads a file.
+    /// Reads a file, or standard input where it is called `-`, and what it includes.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let mut bytes = Vec::new();
-        let read = crate::input::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
-        read.map_err(|source| Error::Read { path: path.to_owned(), source })?;
-        let not_text = |message: String| Error::NotText { path: path.to_owned(), message };
-        if bytes.len() as u64 > MAX_BYTES {
-            return Err(not_text(format!("is larger than {} MB; keep meshes in files of their own", MAX_BYTES >> 20)));
-        }
-        match String::from_utf8(bytes) {
-            Ok(text) => {
-                // A folder whose name is not UTF-8 can be shown only roughly, but must be found.
-                let mut document = Self::parse(&path.display().to_string(), &text)?;
-                document.folder = parent(path);
-                Ok(document)
-            }
-            Err(e) => {
-                let at = e.utf8_error().valid_up_to();
-                Err(not_text(format!(
-                    "is not a pipeline: byte {at} is not UTF-8 text (a binary file, or another encoding)"
-                )))
-            }
-        }
+        let (text, stdin) = (read_text(path)?, path == Path::new(STDIN));
+        let name = if stdin { "<stdin>".to_owned() } else { path.display().to_string() };
+        // A folder whose name is not UTF-8 can be shown only roughly, but must be found.
+        let folder = if stdin { PathBuf::new() } else { parent(path) };
+        Self::parse_in(&name, folder, &text)
     }
 
     /// Reads a text; `file` is what messages call it.
     pub fn parse(file: &str, text: &str) -> Result<Self, Error> {
+        Self::parse_in(file, parent(Path::new(file)), text)
+    }
+
+    fn parse_in(file: &str, folder: PathBuf, text: &str) -> Result<Self, Error> {
         let blank = Node { origin: Origin::File { line: 1, column: 1 }, value: Value::Null };
-        let mut document =
-            Document { file: file.to_owned(), folder: parent(Path::new(file)), root: blank, sets: Vec::new() };
-        document.root = yaml::parse(text).map_err(|p| document.error(p))?;
-        if matches!(document.root.value, Value::Null) {
+        let (file, sets, included) = (file.to_owned(), Vec::new(), Vec::new());
+        let mut document = Document { file, folder, root: blank, sets, included, swept: String::new() };
+        let mut root = yaml::parse(text).map_err(|p| document.error(p))?;
+        if matches!(root.value, Value::Null) {
             let problem = Problem::new("is empty; a pipeline is a mapping with `name` and `stages`");
             return Err(document.error(problem.or_at(Origin::File { line: 1, column: 1 })));
         }
+        let mut included = Vec::new();
+        let mut wrong = None;
+        let found = compose::include(&mut root, &document.folder, &mut Vec::new(), &mut |path| {
+            let number = included.len();
+            included.push(path.to_owned());
+            let text = read_text(path).map_err(|e| with_cause(&e))?;
+            match yaml::parse(&text) {
+                Ok(mut node) => {
+                    node.included(number);
+                    Ok(node)
+                }
+                Err(problem) => {
+                    wrong = Some((number, problem));
+                    Err("is not YAML".to_owned())
+                }
+            }
+        });
+        document.included = included;
+        if let Some((file, problem)) = wrong {
+            let origin = match problem.origin {
+                Some(Origin::File { line, column }) => Origin::Included { file, line, column },
+                _ => Origin::Included { file, line: 1, column: 1 },
+            };
+            return Err(document.error(problem.at(origin)));
+        }
+        found.map_err(|p| document.error(p))?;
+        document.root = root;
         Ok(document)
+    }
+
+    /// Adds a page of all that the pipeline shows, unless it has one.
+    pub fn add_page(&mut self) {
+        let file = yaml::map([("html", Value::Text("page.html".to_owned()))]);
+        let page = yaml::node(yaml::map([("page", file)]));
+        if let Value::Map(entries) = &mut self.root.value
+            && let Some(Entry { value: Node { value: Value::List(stages), .. }, .. }) =
+                entries.iter_mut().find(|entry| entry.key == "stages")
+            && !stages.iter().any(|stage| stage.get("page").is_some())
+        {
+            stages.push(page);
+        }
+    }
+
+    /// The pipelines that it stands for: one, or as many as its `sweep` makes, each with its variables in their places.
+    ///
+    /// # Errors
+    /// If a sweep or a variable is wrong.
+    pub(super) fn expand(mut self) -> Result<Vec<Document>, Error> {
+        compose::strip(&mut self.root);
+        let swept = compose::sweep(&mut self.root).map_err(|p| self.error(p))?;
+        let mut all = Vec::new();
+        for compose::Swept { sets, suffix } in swept.unwrap_or_else(|| vec![compose::Swept::default()]) {
+            let mut document = self.clone();
+            sets.iter().try_for_each(|assignment| document.set(assignment))?;
+            compose::substitute(&mut document.root).map_err(|p| document.error(p))?;
+            if let Value::Map(entries) = &mut document.root.value
+                && let Some(Entry { value: Node { value: Value::Text(name), .. }, .. }) =
+                    entries.iter_mut().find(|entry| entry.key == "name")
+            {
+                *name += &suffix;
+            }
+            document.swept = suffix.trim_start_matches('-').to_owned();
+            all.push(document);
+        }
+        Ok(all)
+    }
+
+    /// The files that it includes, as they were found.
+    pub fn included(&self) -> &[PathBuf] {
+        &self.included
+    }
+
+    /// What tells it from the others of its sweep; empty if there are none.
+    pub fn swept(&self) -> &str {
+        &self.swept
     }
 
     /// Applies an override, `KEY=VALUE`. What KEY may be: [`overrides`].
@@ -73,12 +142,31 @@ impl Document {
         yaml::decode(&self.root).map_err(|p| self.error(p))
     }
 
+    /// Puts a value in the place of what is written at a path, where complaints about it still point.
+    pub(super) fn put(&mut self, path: &str, value: &serde_json::Value) {
+        let Some((origin, _)) = self.origin(path) else { return };
+        let mut node = Some(&mut self.root);
+        for segment in yaml::parse_path(path).unwrap_or_default() {
+            node = node.and_then(|node| match (&segment, &mut node.value) {
+                (Segment::Key(key), Value::Map(entries)) => {
+                    entries.iter_mut().find(|entry| entry.key == *key).map(|entry| &mut entry.value)
+                }
+                (Segment::Index(index), Value::List(items)) => items.get_mut(*index),
+                _ => None,
+            });
+        }
+        if let Some(node) = node {
+            *node = yaml::node(yaml::from_json(value));
+            node.set_origin(origin);
+        }
+    }
+
     /// Line and column, from 1, of the value at a dotted path, or of its nearest part that is written. None if
     /// an override gave it, or if the path is malformed.
     pub fn locate(&self, path: &str) -> Option<(usize, usize)> {
         match self.origin(path)?.0 {
             Origin::File { line, column } => Some((line, column)),
-            Origin::Set(_) => None,
+            Origin::Set(_) | Origin::Included { .. } => None,
         }
     }
 
@@ -128,6 +216,10 @@ impl Document {
     fn place(&self, origin: Origin) -> Place {
         match origin {
             Origin::File { line, column } => Place::File { file: self.file.clone(), line, column },
+            Origin::Included { file, line, column } => {
+                let file = self.included.get(file).map(|path| path.display().to_string()).unwrap_or_default();
+                Place::File { file, line, column }
+            }
             Origin::Set(index) => Place::Set(self.sets.get(index).cloned().unwrap_or_default()),
         }
     }
@@ -136,6 +228,31 @@ impl Document {
         let place = self.place(problem.origin.unwrap_or(self.root.origin));
         Error::Refused(Box::new(Refusal { place, path: problem.path(), message: problem.to_string() }))
     }
+}
+
+/// The text of a file, or of standard input.
+fn read_text(path: &Path) -> Result<String, Error> {
+    let mut bytes = Vec::new();
+    let read = if path == Path::new(STDIN) {
+        std::io::stdin().lock().take(MAX_BYTES + 1).read_to_end(&mut bytes)
+    } else {
+        crate::input::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+    };
+    read.map_err(|source| Error::Read { path: path.to_owned(), source })?;
+    let not_text = |message: String| Error::NotText { path: path.to_owned(), message };
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(not_text(format!("is larger than {} MB; keep meshes in files of their own", MAX_BYTES >> 20)));
+    }
+    String::from_utf8(bytes).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        not_text(format!("is not a pipeline: byte {at} is not UTF-8 text (a binary file, or another encoding)"))
+    })
+}
+
+/// An error and its causes.
+fn with_cause(error: &Error) -> String {
+    let cause = std::error::Error::source(error).map(|cause| format!(": {cause}"));
+    format!("{error}{}", cause.unwrap_or_default())
 }
 
 fn parent(file: &Path) -> PathBuf {

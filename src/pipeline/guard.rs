@@ -12,6 +12,7 @@ use crate::stages::Invalid;
 pub(super) fn check(pipeline: &Pipeline) -> Result<(), Error> {
     let plan = &pipeline.plan;
     let mut inputs = vec![(PathBuf::from(pipeline.document.file()), "the pipeline itself".to_owned())];
+    inputs.extend(pipeline.document.included().iter().map(|file| (file.clone(), "an included file".to_owned())));
     for (index, stage) in plan.stages.iter().enumerate() {
         inputs.extend(plan.input_files(index).into_iter().map(|file| (file, format!("an input of {}", stage.path))));
     }

@@ -12,6 +12,7 @@
 
 mod book;
 mod cache;
+mod compose;
 mod document;
 mod error;
 mod guard;
@@ -25,6 +26,7 @@ mod report;
 mod run;
 mod schema;
 mod settings;
+mod share;
 pub mod spec;
 mod study;
 mod yaml;
@@ -32,19 +34,22 @@ mod yaml;
 use std::path::{Path, PathBuf};
 
 use crate::progress::{Progress, Silent};
+use crate::stages::fit::Fitted;
 use crate::stages::prepare::Prepared;
 use crate::stages::write::PROGRAM;
 use crate::stages::{Invalid, Piece, Plan, suggest};
 
-pub use document::Document;
+pub use crate::stages::suggest::unknown as unknown_word;
+pub use document::{Document, STDIN};
 pub use error::{Error, Place, Refusal};
 pub use launcher::Launched;
 pub use pieces::PiecesError;
 pub use provenance::Told;
 pub use report::{FileReport, Report, StageTime};
-pub use run::{RunError, merge, run};
+pub use run::{RunError, merge, run, run_sharing};
 pub use schema::schema;
 pub use settings::{Backend, BackendError, Settings};
+pub use share::Shared;
 pub use study::{Study, study};
 
 /// A plan, and the text it was made from, which later complaints cite.
@@ -65,21 +70,71 @@ impl Pipeline {
         Self::from_document(Document::read(path)?, overrides, out)
     }
 
-    /// The same, from a text that was read already.
-    pub fn from_document(mut document: Document, overrides: &[String], out: Option<PathBuf>) -> Result<Self, Error> {
+    /// The same for a document that may have a `sweep`: the pipelines that it makes, in order. With `out` those of a sweep go into
+    /// folders within it.
+    ///
+    /// # Errors
+    /// Whatever is wrong with one.
+    pub fn swept(document: Document, overrides: &[String], out: Option<PathBuf>) -> Result<Vec<Self>, Error> {
+        let place = |document: &Document| {
+            let inner =
+                |out: &PathBuf| if document.swept().is_empty() { out.clone() } else { out.join(document.swept()) };
+            out.as_ref().map(inner)
+        };
+        let documents = Self::documents(document, overrides)?;
+        documents
+            .into_iter()
+            .map(|document| (place(&document), document))
+            .map(|(out, d)| Self::resolve(d, out))
+            .collect()
+    }
+
+    /// A document with overrides, and all the pipelines that it stands for.
+    fn documents(mut document: Document, overrides: &[String]) -> Result<Vec<Document>, Error> {
         for assignment in overrides {
             document.set(assignment)?;
         }
-        let spec: spec::PipelineSpec = document.decode()?;
-        let folder = spec.folder.iter().fold(document.folder(), |base, folder| base.join(folder));
-        let seed = spec.seed.unwrap_or(0);
-        let plan = Plan::new(&spec.name, seed, &spec.stages, folder, out);
-        let mut plan = plan.map_err(|invalid| document.refuse(invalid))?;
+        document.expand()
+    }
+
+    /// The same, from a text that was read already.
+    ///
+    /// # Errors
+    /// Whatever is wrong with it; a `sweep`, which makes several ([`Pipeline::swept`]).
+    pub fn from_document(document: Document, overrides: &[String], out: Option<PathBuf>) -> Result<Self, Error> {
+        let mut documents = Self::documents(document, overrides)?;
+        match (documents.pop(), documents.len()) {
+            (Some(document), 0) => Self::resolve(document, out),
+            (Some(document), more) => {
+                let message = format!("makes {} pipelines, and one is expected; take it out by --set sweep=", more + 1);
+                Err(document.refuse(Invalid::new("sweep", message)))
+            }
+            (None, _) => unreachable!("a document stands for a pipeline at least"),
+        }
+    }
+
+    fn resolve(mut document: Document, out: Option<PathBuf>) -> Result<Self, Error> {
+        let (spec, mut plan) = Self::understood(&document, out.clone())?;
+        let fitted = plan.fit(&Silent).map_err(|invalid| document.refuse(invalid))?;
+        if !fitted.is_empty() {
+            fitted.iter().for_each(|Fitted { path, camera }| document.put(path, camera));
+            // What there is to say of it was said of what was written.
+            let warnings = std::mem::take(&mut plan.warnings);
+            plan = Plan { warnings, ..Self::understood(&document, out)?.1 };
+        }
         if let Some(program) = spec.program.filter(|program| program != PROGRAM) {
             let message = format!("was written by {program}, and this is {PROGRAM}, whose files may be others");
             plan.warnings.push(Invalid::new("program", message));
         }
         Ok(Pipeline { plan, document, inputs: spec.inputs.unwrap_or_default() })
+    }
+
+    /// What a document says, and what it means.
+    fn understood(document: &Document, out: Option<PathBuf>) -> Result<(spec::PipelineSpec, Plan), Error> {
+        let spec: spec::PipelineSpec = document.decode()?;
+        let folder = spec.folder.iter().fold(document.folder(), |base, folder| base.join(folder));
+        let plan = Plan::new(&spec.name, spec.seed.unwrap_or(0), &spec.stages, folder, out);
+        Ok((spec, plan.map_err(|invalid| document.refuse(invalid))?))
     }
 
     /// Builds the scenes for which `wanted` says so, and reads the occlusion files that are loaded into them and wanted

@@ -4,7 +4,7 @@
 //! about it quotes it. KEY is a dotted path. Its first word is looked up in this order:
 //!
 //! 1. `name`, `seed` and `stages`, the pipeline's own keys (`stages[1].render.shading` reaches any stage); `folder`,
-//!    `inputs` and `program` too, where no stage is called so;
+//!    `inputs`, `program`, `variables` and `sweep` too, where no stage is called so;
 //! 2. a stage's `id`: `with-ao.dimensions` changes that stage;
 //! 3. a kind of stage: `occlusion.samples` changes every stage of that kind, with an id or without.
 //!
@@ -21,7 +21,7 @@ use crate::stages::KINDS;
 pub(super) const TOP_KEYS: [&str; 3] = ["name", "seed", "stages"];
 
 /// Those of them that files tell, and nobody needs to write.
-const RARE_KEYS: [&str; 3] = ["program", "folder", "inputs"];
+const RARE_KEYS: [&str; 5] = ["program", "folder", "inputs", "variables", "sweep"];
 
 /// Where a stage is added.
 const APPEND: &str = "stages[+]";

@@ -16,7 +16,9 @@ use super::lock::{Busy, Lock};
 use super::pieces::{self, PiecesError};
 use super::report::Report;
 use super::settings::Backend;
+use super::share::{Kept, Scenes, Shared};
 use super::{Error, Pipeline, Settings, provenance};
+use crate::geometry::Dimension;
 use crate::io;
 use crate::mesh::Mesh;
 use crate::occlusion::Cancelled;
@@ -85,7 +87,20 @@ impl<E: Into<StageError>> From<E> for RunError {
 /// # Errors
 /// [`RunError`]; files that were finished before stay, none is left half-written.
 pub fn run(pipeline: &Pipeline, settings: &Settings, progress: &dyn Progress) -> Result<Report, RunError> {
-    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress, None))
+    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress, None, None))
+}
+
+/// The same, and takes over what earlier runs made of the same scenes with the same settings. The files are the same bytes.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_sharing(
+    pipeline: &Pipeline,
+    settings: &Settings,
+    progress: &dyn Progress,
+    shared: &mut Shared,
+) -> Result<Report, RunError> {
+    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress, None, Some(shared)))
 }
 
 /// Makes a pipeline's files of the parts that the pieces of a run left: the same bytes as [`run`] makes. `count` says of how
@@ -100,7 +115,7 @@ pub fn merge(
     progress: &dyn Progress,
 ) -> Result<Report, RunError> {
     let joined = pieces::find(pipeline, count)?;
-    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress, Some(joined)))
+    settings.pool().map_err(RunError::Threads)?.install(|| run_here(pipeline, settings, progress, Some(joined), None))
 }
 
 fn run_here(
@@ -108,6 +123,7 @@ fn run_here(
     settings: &Settings,
     progress: &dyn Progress,
     joined: Option<Joined>,
+    shared: Option<&mut Shared>,
 ) -> Result<Report, RunError> {
     let began = Instant::now();
     let plan = &pipeline.plan;
@@ -125,10 +141,18 @@ fn run_here(
     let mut book = Book::open(plan, &keys, made_by, settings.force);
     check_resources(pipeline, &book)?;
     let running = progress.stage("scene", 0);
+    let blank = &mut Shared::default();
+    // A piece knows a part of the values only.
+    let sharing = shared.is_some() && plan.piece.is_none();
+    let shared = shared.filter(|_| sharing).unwrap_or(blank);
+    // A file of values is held against the scene as it is built.
+    let loads = |scene| plan.all::<OcclusionPlan>().any(|(_, o)| o.scene == scene && o.is_loaded());
+    let known = |scene: Ref<ScenePlan>| shared.has(keys.of(scene.index())) && !loads(scene);
     let wanted = |stage| match plan.scene_of(stage) {
-        Some(scene) => book.needs(plan, scene),
+        Some(scene) => book.needs(plan, scene) && !known(scene),
         None => book.needs_stage(stage),
     };
+    let takes: Vec<bool> = plan.all::<ScenePlan>().map(|(s, _)| book.needs(plan, s) && known(s)).collect();
     let prepared = pipeline.prepare_watched(wanted, progress);
     running.end();
     if progress.cancelled() {
@@ -151,12 +175,16 @@ fn run_here(
     let force = settings.force;
     let (told, times) = (&*text, BTreeMap::new());
     let work = Work::default();
-    let mut run = Schedule { pipeline, told, opencl, progress, book: &mut book, loaded, force, joined, work, times };
-    for (((scene, _), mesh), notes) in plan.all::<ScenePlan>().zip(meshes).zip(notes) {
-        match mesh {
-            Some(AnyMesh::Three(mesh)) => run.scene(scene, mesh, notes, building)?,
-            Some(AnyMesh::Four(mesh)) => run.scene(scene, mesh, notes, building)?,
-            None => (0..plan.stages.len())
+    let share = Share { keys: &keys, shared, sharing };
+    let mut run =
+        Schedule { pipeline, told, opencl, progress, book: &mut book, loaded, force, joined, work, times, share };
+    for ((((scene, of), mesh), notes), takes) in plan.all::<ScenePlan>().zip(meshes).zip(notes).zip(takes) {
+        match (mesh, of.dimension) {
+            (Some(AnyMesh::Three(mesh)), _) => run.scene::<3>(scene, Some((mesh, notes)), building)?,
+            (Some(AnyMesh::Four(mesh)), _) => run.scene::<4>(scene, Some((mesh, notes)), building)?,
+            (None, Dimension::Three) if takes => run.scene::<3>(scene, None, building)?,
+            (None, Dimension::Four) if takes => run.scene::<4>(scene, None, building)?,
+            (None, _) => (0..plan.stages.len())
                 .filter(|&stage| plan.scene_of(stage) == Some(scene))
                 .for_each(|stage| run.book.tell_unchanged(plan, stage)),
         }
@@ -210,22 +238,48 @@ struct Schedule<'p> {
     joined: Option<Joined>,
     work: Work,
     times: BTreeMap<usize, (Duration, String)>,
+    share: Share<'p>,
+}
+
+/// What is taken over from other runs, and left for them.
+struct Share<'p> {
+    keys: &'p Keys,
+    shared: &'p mut Shared,
+    /// Whether anything is left for others.
+    sharing: bool,
 }
 
 impl Schedule<'_> {
-    /// Runs the stages that are about one scene, in order.
+    /// Runs the stages that are about one scene, in order. Without a mesh it is one that another run has left.
     fn scene<const D: usize>(
         &mut self,
         scene: Ref<ScenePlan>,
-        mesh: Mesh<D>,
-        notes: Vec<String>,
+        built: Option<(Mesh<D>, Vec<String>)>,
         building: Duration,
-    ) -> Result<(), RunError> {
+    ) -> Result<(), RunError>
+    where
+        Shared: Scenes<D>,
+    {
         let plan = &self.pipeline.plan;
+        let keys = self.share.keys;
+        let (mut at_work, notes) = match built {
+            Some((mesh, notes)) => {
+                let session = match &self.opencl {
+                    Some(opencl) => Session::on(mesh, Arc::clone(opencl)),
+                    None => Session::new(mesh),
+                };
+                (SceneRun::new(session), notes)
+            }
+            None => match self.share.shared.scenes().get(keys.of(scene.index())) {
+                Some(kept) => (kept.at_work(plan, keys, scene.index()), kept.notes.clone()),
+                None => return Ok(()),
+            },
+        };
+        let mesh = Arc::clone(at_work.session.mesh());
         let (vertices, simplices) = (mesh.vertices.len() as u64, mesh.simplices.len() as u64);
         let detail = format!("{} vertices, {} simplices", grouped(vertices), grouped(simplices));
         self.times.insert(scene.index(), (building, detail));
-        self.book.begin_scene(notes);
+        self.book.begin_scene(notes.clone());
         let is_shaded = plan.all::<OcclusionPlan>().any(|(_, occlusion)| occlusion.scene == scene);
         if self.opencl.is_some() && mesh.is_translucent() && is_shaded {
             let id = plan.id(scene);
@@ -233,11 +287,6 @@ impl Schedule<'_> {
                 "scene {id}: light passes some objects, so its ambient occlusion is computed by the processor, not by OpenCL"
             )]);
         }
-        let session = match &self.opencl {
-            Some(opencl) => Session::on(mesh, Arc::clone(opencl)),
-            None => Session::new(mesh),
-        };
-        let mut at_work = SceneRun::new(session);
         for stage in (0..plan.stages.len()).filter(|&stage| plan.scene_of(stage) == Some(scene)) {
             if stage != scene.index() {
                 self.stage(stage, |run| plan.run(stage, run, &mut at_work))?;
@@ -245,6 +294,9 @@ impl Schedule<'_> {
             self.book.tell_unchanged(plan, stage);
         }
         self.book.begin_scene(Vec::new());
+        if self.share.sharing {
+            Kept::keep(self.share.shared.scenes(), (plan, keys, scene.index()), &at_work, notes);
+        }
         Ok(())
     }
 

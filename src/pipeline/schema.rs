@@ -2,11 +2,43 @@
 //!
 //! It is derived from the very types that decode a pipeline, so it can't know other keys than they do.
 
+use serde_json::{Value, json};
+
 use super::spec::PipelineSpec;
 
+/// What the schema is called, wherever it lies.
+const ID: &str = "urn:ao4d:schema:pipeline";
+
 /// The schema, as JSON Schema draft 2020-12.
-pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(PipelineSpec).to_value()
+pub fn schema() -> Value {
+    let mut schema = schemars::schema_for!(PipelineSpec).to_value();
+    if let Some(items) = schema.pointer_mut("/properties/stages/items") {
+        let file = json!({ "type": "string", "description": "A file whose stages stand here." });
+        let include = json!({
+            "type": "object", "description": "The stages of another file.", "properties": { "include": file },
+            "required": ["include"], "additionalProperties": false
+        });
+        *items = json!({ "anyOf": [items.take(), include] });
+    }
+    allow_own_keys(&mut schema);
+    if let Value::Object(map) = &mut schema {
+        map.insert("$id".to_owned(), ID.into());
+    }
+    schema
+}
+
+/// Keys that begin with `x-` are the user's own, wherever keys are.
+fn allow_own_keys(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            if map.contains_key("properties") {
+                map.insert("patternProperties".to_owned(), json!({ "^x-": true }));
+            }
+            map.values_mut().for_each(allow_own_keys);
+        }
+        Value::Array(items) => items.iter_mut().for_each(allow_own_keys),
+        _ => {}
+    }
 }
 
 #[cfg(test)]
@@ -14,7 +46,6 @@ mod tests {
     use std::collections::BTreeSet;
 
     use serde::de::DeserializeOwned;
-    use serde_json::Value;
 
     use super::*;
     use crate::pipeline::spec::InputSpec;
@@ -27,6 +58,7 @@ mod tests {
     use crate::stages::cut::{Axis, Plane};
     use crate::stages::mesh::MeshSpec;
     use crate::stages::occlusion::{Method, OcclusionSpec};
+    use crate::stages::page::PageSpec;
     use crate::stages::paraview::{ColorBy, ParaviewSpec, Reader, Style};
     use crate::stages::render::{RenderSpec, Shading};
     use crate::stages::scene::SceneSpec;
@@ -82,6 +114,7 @@ mod tests {
             ("ScreenSpaceSpec", decoder_knows::<ScreenSpaceSpec>("{zzz: 1}")),
             ("ShadeSpec", decoder_knows::<ShadeSpec>("{zzz: 1}")),
             ("InputSpec", decoder_knows::<InputSpec>("{zzz: 1}")),
+            ("PageSpec", decoder_knows::<PageSpec>("{zzz: 1}")),
             ("ParaviewSpec", decoder_knows::<ParaviewSpec>("{zzz: 1}")),
             ("Plane", decoder_knows::<Plane>("{zzz: 1}")),
             ("Method", decoder_knows::<Method>("zzz")),

@@ -4,12 +4,13 @@
 //! what wasn't. Numbers are whatever was typed; ranges, references between stages and lengths of vectors are checked
 //! by each stage. The doc comments are what `ao4d schema` shows in an editor.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::stages::StageSpec;
+use crate::stages::{OneOrMany, StageSpec};
 
 /// A pipeline: named stages that turn a scene into images.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -26,6 +27,13 @@ pub struct PipelineSpec {
     pub program: Option<String>,
     /// Where relative paths of inputs start (default the pipeline's own folder).
     pub folder: Option<PathBuf>,
+    /// Values by name: a value `$NAME` is that value, and `${NAME}` within a text its text; `$$` is a dollar sign.
+    pub variables: Option<BTreeMap<String, serde_json::Value>>,
+    /// Other files, by their names from here, whose stages come before those of this one; their variables hold where this
+    /// one doesn't give its own. Among the stages, `- include: FILE` puts a file's stages there.
+    pub include: Option<OneOrMany>,
+    /// Keys as `--set` names them, each with a list of values: every combination is a pipeline of its own, NAME-KEY-VALUE.
+    pub sweep: Option<BTreeMap<String, Vec<serde_json::Value>>>,
     /// Inputs that must be what they were. One that changed is refused.
     pub inputs: Option<Vec<InputSpec>>,
 }

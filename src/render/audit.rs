@@ -68,6 +68,14 @@ impl<const D: usize> Audit<D> {
         Self { sampling, chosen: BTreeMap::new() }
     }
 
+    /// Voxels whose number has a hash above this are not chosen any more.
+    pub fn limit(&self) -> u64 {
+        match self.chosen.last_key_value() {
+            Some((&(last, _), _)) if self.chosen.len() == VOXELS => last,
+            _ => u64::MAX,
+        }
+    }
+
     /// Chooses among some finished layers.
     pub(super) fn add(&mut self, buffer: &GBuffer<D>) {
         let first = buffer.layers().start * buffer.layer_len();
@@ -130,7 +138,7 @@ impl<const D: usize> Audit<D> {
 }
 
 /// Spreads numbers evenly (the finaliser of SplitMix64; Steele, Lea and Flood 2014).
-fn hash(number: u64) -> u64 {
+pub(super) fn hash(number: u64) -> u64 {
     let mut x = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -245,19 +245,22 @@ impl<const D: usize> Camera<D> {
 
     /// A direction by its parts along the axes of the camera's frame: right, up, over (in 4D), back.
     pub(super) fn to_frame(&self, direction: &Vector64<D>) -> Vector64<D> {
-        let axes = match Dimension::of::<D>() {
-            Dimension::Three => [&self.right, &self.up, &self.back, &self.back],
-            Dimension::Four => [&self.right, &self.up, &self.over, &self.back],
-        };
+        let axes = self.axes();
         Vector64::from_fn(|r, _| axes[r].dot(direction))
     }
 
-    /// The direction that has these parts along the axes of the camera's frame.
-    pub(super) fn from_frame(&self, parts: &Vector<D>) -> Vector<D> {
-        let axes = match Dimension::of::<D>() {
-            Dimension::Three => [&self.right, &self.up, &self.back, &self.back],
-            Dimension::Four => [&self.right, &self.up, &self.over, &self.back],
+    /// The axes of the camera's frame: right, up, over (in 4D), back.
+    pub fn axes(&self) -> [Vector64<D>; D] {
+        let all = match Dimension::of::<D>() {
+            Dimension::Three => [self.right, self.up, self.back, self.back],
+            Dimension::Four => [self.right, self.up, self.over, self.back],
         };
+        std::array::from_fn(|axis| all[axis])
+    }
+
+    /// The direction that has these parts along the axes of the camera's frame.
+    pub(super) fn out_of_frame(&self, parts: &Vector<D>) -> Vector<D> {
+        let axes = self.axes();
         narrow(&(0..D).fold(Vector64::zeros(), |sum, r| sum + axes[r] * f64::from(parts[r])))
     }
 

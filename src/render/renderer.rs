@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::audit::Audit;
 use super::filters::{self, Chain, ImageFilter};
@@ -141,6 +142,9 @@ impl<const D: usize> Renderer<D> {
             Shading::ScreenSpace(settings) => Some(self.depth_image(settings, columns, progress)?),
             _ => None,
         };
+        // Where only the audit asks for points, it does so of few voxels.
+        let limit = AtomicU64::new(u64::MAX);
+        let points = Columns::POSITION | Columns::NORMAL | Columns::SHADING_NORMAL | Columns::BARYCENTRIC;
         let pass = SurfacePass {
             tracer: self.tracer(),
             camera: &self.camera,
@@ -149,6 +153,7 @@ impl<const D: usize> Renderer<D> {
             shading: &self.shading,
             lighting: self.lighting.as_ref(),
             skylight: self.skylight.as_deref(),
+            points: (!self.columns_shown(aovs).intersects(points)).then_some(&limit),
         };
         if columns.contains(Columns::DIRECT) {
             self.tracer().prepare();
@@ -204,6 +209,7 @@ impl<const D: usize> Renderer<D> {
             let seen = buffer.simplex.iter().filter(|&&simplex| simplex != NOTHING).count() as u64;
             if let Some(audit) = audit.as_mut().filter(|_| first <= border) {
                 audit.add(&buffer);
+                limit.store(audit.limit(), Ordering::Relaxed);
             }
             let arrays = aovs.iter().flat_map(|aov| aov.arrays(&buffer, &layers)).collect();
             let is_behind = |simplex: u32| simplex != NOTHING && visibility.is_away(simplex);
@@ -274,6 +280,7 @@ impl<const D: usize> Renderer<D> {
             shading: &Shading::None,
             lighting: None,
             skylight: None,
+            points: None,
         };
         let [_, _, layers] = self.grid.dimensions;
         let voxel = columns.bytes::<D>() + size_of::<u32>();
@@ -284,11 +291,14 @@ impl<const D: usize> Renderer<D> {
         Ok(())
     }
 
-    /// The columns that arrays and filters need.
+    /// The columns that the picture needs.
     fn columns(&self, aovs: &[Aov]) -> Columns {
-        let audited = self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS);
+        self.columns_shown(aovs) | self.audit.map_or(Columns::empty(), |_| Audit::<D>::COLUMNS)
+    }
+
+    /// The columns that arrays and filters need.
+    fn columns_shown(&self, aovs: &[Aov]) -> Columns {
         let mut columns = columns(&self.shading, aovs)
-            | audited
             | self.filters.iter().fold(Columns::empty(), |all, filter| all | filter.columns());
         if self.lighting.is_some() && columns.contains(Columns::ALBEDO) {
             columns |= Columns::DIRECT;

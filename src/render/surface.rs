@@ -7,13 +7,14 @@
 //! value at its centre.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
 use super::gbuffer::{Columns, GBuffer, RowMut};
 use super::light::{Lighting, Lit, reflectance};
 use super::samples::{Group, Sampling};
-use super::{Camera, Shading, Skylight, Visibility};
+use super::{Camera, Shading, Skylight, Visibility, audit};
 use crate::accel::Tracer;
 use crate::geometry::{Cone, Crossing, Ray, Vector, Vector64, narrow, normal_of, widen};
 use crate::mesh::normals::unit;
@@ -29,6 +30,8 @@ pub(super) struct SurfacePass<'r, const D: usize> {
     pub shading: &'r Shading,
     pub lighting: Option<&'r Lighting<D>>,
     pub skylight: Option<&'r Skylight<D>>,
+    /// If it is there, voxels' points are needed only where the hash of the voxel's number is at most this.
+    pub points: Option<&'r AtomicU64>,
 }
 
 /// Where a ray meets a simplex.
@@ -104,6 +107,13 @@ impl<const D: usize> SurfacePass<'_, D> {
         Ok(buffer)
     }
 
+    /// Whether nobody asks for the point of this voxel.
+    fn needs_no_point(&self, [i, j, k]: [usize; 3]) -> bool {
+        let [width, height, _] = self.sampling.grid.dimensions;
+        let number = i + width * (j + height * k);
+        self.points.is_some_and(|limit| audit::hash(number as u64) > limit.load(Ordering::Relaxed))
+    }
+
     /// How much of what is behind a simplex it hides.
     pub fn opacity_of(&self, simplex: u32) -> f64 {
         let mesh = self.tracer.mesh();
@@ -123,7 +133,7 @@ impl<const D: usize> SurfacePass<'_, D> {
         if out.has_means() {
             self.means(index, scratch, out.has_sky()).set(i, out);
         }
-        if !out.has_point() {
+        if !out.has_point() || self.needs_no_point(index) {
             return;
         }
         let ray = self.sampling.ray(self.camera, index, sample);

@@ -27,11 +27,11 @@ use super::lattice::compact;
 use super::numbers::{check_count, finite, only_in, point};
 use super::product::Chain;
 use super::transform::{self, TransformStep};
+use super::welding::Weld;
 use crate::geometry::{Dimension, Vector64, determinant};
 use crate::io::Input;
 use crate::io::mesh::Cells;
 use crate::mesh::Surface;
-use crate::mesh::weld::weld;
 use crate::progress::Progress;
 
 /// A mesh from a file, swept along the fourth axis.
@@ -68,7 +68,13 @@ fn one() -> u32 {
 
 impl ExtrudeSpec {
     /// The walls, and caps if the mesh is of tetrahedra. Refused in 3D.
-    pub fn build<const D: usize>(&self, folder: &Path, progress: &dyn Progress) -> Result<Surface<D>, Error> {
+    pub(super) fn build<const D: usize>(
+        &self,
+        folder: &Path,
+        weld: Weld,
+        notes: &mut Vec<String>,
+        progress: &dyn Progress,
+    ) -> Result<Surface<D>, Error> {
         only_in::<D>(Dimension::Four, "extrude", "; take file")?;
         let (from, to) = (finite("extrude.from", self.from)?, finite("extrude.to", self.to)?);
         if from == to {
@@ -90,7 +96,7 @@ impl ExtrudeSpec {
         let mesh = input.read()?;
         let swept = match mesh.cells {
             Cells::Triangles(triangles) => {
-                let (points, triangles) = weld(&mesh.points, triangles);
+                let (points, triangles) = weld.apply(&mesh.points, triangles, notes)?;
                 let interval = Chain::interval(self.layers);
                 if self.caps == Some(true) {
                     let (points, tetrahedra) =
@@ -108,7 +114,7 @@ impl ExtrudeSpec {
                 }
             }
             Cells::Tetrahedra(tetrahedra) => {
-                let (points, tetrahedra) = weld(&mesh.points, tetrahedra);
+                let (points, tetrahedra) = weld.apply(&mesh.points, tetrahedra, notes)?;
                 let solid = solid(&points, tetrahedra).map_err(|message| input.wrong(message))?;
                 let boundary = solid.boundary();
                 self.check_size(points.len(), solid.len(), boundary.len())?;

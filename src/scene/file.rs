@@ -7,14 +7,21 @@
 
 use std::path::Path;
 
+use super::Error;
 use super::numbers::MAX_SIMPLICES;
+use super::welding::Weld;
 use crate::geometry::{Dimension, Vector64};
+use crate::io::Input;
 use crate::io::mesh::Cells;
-use crate::io::{Input, InputError};
 use crate::mesh::Surface;
 
 /// The surface that the file holds.
-pub fn build<const D: usize>(path: &Path, folder: &Path, notes: &mut Vec<String>) -> Result<Surface<D>, InputError> {
+pub fn build<const D: usize>(
+    path: &Path,
+    folder: &Path,
+    weld: Weld,
+    notes: &mut Vec<String>,
+) -> Result<Surface<D>, Error> {
     let input = Input::new("file", folder, path);
     let mesh = input.read()?;
     notes.extend(mesh.notes.iter().map(|note| format!("file: {note}")));
@@ -25,25 +32,32 @@ pub fn build<const D: usize>(path: &Path, folder: &Path, notes: &mut Vec<String>
         Cells::Tetrahedra(tetrahedra) => of_size(tetrahedra),
     };
     let Some(simplices) = simplices else {
-        return Err(input.wrong(match Dimension::of::<D>() {
+        let message = match Dimension::of::<D>() {
             Dimension::Three => "holds tetrahedra; a scene of dimension 3 is made of triangles",
             Dimension::Four => {
                 "holds triangles; a scene of dimension 4 is made of tetrahedra: take extrude, or dimension: 3"
             }
-        }));
+        };
+        return Err(input.wrong(message).into());
     };
     if simplices.len() as u64 > MAX_SIMPLICES {
-        return Err(input.wrong(format!("holds {} simplices; the most is {MAX_SIMPLICES}", simplices.len())));
+        return Err(input.wrong(format!("holds {} simplices; the most is {MAX_SIMPLICES}", simplices.len())).into());
     }
     let vertices = match (position, Dimension::of::<D>()) {
         (Some(position), _) => position,
         (None, Dimension::Three) => mesh.points.iter().map(|p| Vector64::from_fn(|row, _| p[row])).collect(),
         (None, Dimension::Four) => {
-            return Err(input.wrong(
-                "has no point array \"position\" of 4 components; extrude sweeps a three-dimensional mesh along w",
-            ));
+            let message =
+                "has no point array \"position\" of 4 components; extrude sweeps a three-dimensional mesh along w";
+            return Err(input.wrong(message).into());
         }
     };
+    if !weld.wanted() {
+        return Ok(Surface { vertices, simplices, normals });
+    }
+    let (kept, simplices) = weld.kept(&vertices, simplices, notes)?;
+    let vertices = kept.iter().map(|&i| vertices[i as usize]).collect();
+    let normals = normals.map(|normals| kept.iter().map(|&i| normals[i as usize]).collect());
     Ok(Surface { vertices, simplices, normals })
 }
 

@@ -41,6 +41,7 @@ mod slab;
 mod spin;
 mod transform;
 mod twin;
+mod welding;
 
 pub use color::Color;
 pub use cuboid::{BoxSpec, TesseractSpec};

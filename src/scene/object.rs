@@ -18,6 +18,7 @@ use super::simplices::SimplicesSpec;
 use super::slab::SlabSpec;
 use super::spin::SpinSpec;
 use super::transform::{self, TransformStep};
+use super::welding::Weld;
 use super::{Error, file};
 use crate::geometry::Dimension;
 use crate::mesh::corners::DEFAULT_ANGLE;
@@ -81,6 +82,11 @@ pub struct ObjectSpec {
     /// What of it is kept: the part between two parallel hyperplanes, before it is placed. What was closed is closed again.
     #[serde(default)]
     pub slab: Option<SlabSpec>,
+    /// Of a mesh from a file (`file`, `extrude`, `spin`): points no farther apart than this, in the file's units, are one. So
+    /// close surfaces whose triangles meet but for rounding. If left out, points in one place are one where that matters.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub weld: Option<f64>,
     /// Steps that place the object, applied in this order.
     #[serde(default)]
     pub transform: Vec<TransformStep>,
@@ -223,13 +229,14 @@ impl Shape<'_> {
     fn build<const D: usize>(
         &self,
         folder: &Path,
+        weld: Weld,
         notes: &mut Vec<String>,
         progress: &dyn Progress,
     ) -> Result<Surface<D>, Error> {
         match self {
             Shape::Simplices(spec) => spec.build(),
-            Shape::File(path) => Ok(file::build(path, folder, notes)?),
-            Shape::Extrude(spec) => spec.build(folder, progress),
+            Shape::File(path) => file::build(path, folder, weld, notes),
+            Shape::Extrude(spec) => spec.build(folder, weld, notes, progress),
             Shape::CutCube(spec) => spec.build(),
             Shape::Box(spec) => spec.build(),
             Shape::Tesseract(spec) => spec.build(),
@@ -239,7 +246,7 @@ impl Shape<'_> {
                 spec.build("sphere")
             }
             Shape::Isosurface(spec) => spec.build(folder, notes, progress),
-            Shape::Spin(spec) => spec.build(folder),
+            Shape::Spin(spec) => spec.build(folder, weld, notes),
             Shape::Polytope(spec) => spec.build(),
             Shape::Duoprism(spec) => spec.build(),
             Shape::Duocylinder(spec) => spec.build(),
@@ -348,7 +355,13 @@ pub fn build_object_watched<const D: usize>(
     spec.color.rgb()?;
     spec.surface_opacity()?;
     spec.gloss()?;
-    let mut surface = shape.build::<D>(folder, notes, progress)?;
+    let weld = Weld::new(spec.weld)?;
+    if spec.weld.is_some() && !matches!(shape, Shape::File(_) | Shape::Extrude(_) | Shape::Spin(_)) {
+        let message =
+            format!("a {} has no points to weld; only meshes from files have: file, extrude, spin", shape.key());
+        return Err(Error::invalid("weld", message));
+    }
+    let mut surface = shape.build::<D>(folder, weld, notes, progress)?;
     if let Some(slab) = &spec.slab {
         surface = slab.cut(surface, progress)?;
     }

@@ -15,6 +15,7 @@ use super::Error;
 use super::extrude::solid;
 use super::numbers::{AXES, check_count, finite, only_in};
 use super::product::Chain;
+use super::welding::Weld;
 use crate::geometry::{Dimension, Vector64};
 use crate::io::Input;
 use crate::io::mesh::Cells;
@@ -41,7 +42,12 @@ pub struct SpinSpec {
 
 impl SpinSpec {
     /// The surface of revolution. Refused in 3D.
-    pub fn build<const D: usize>(&self, folder: &Path) -> Result<Surface<D>, Error> {
+    pub(super) fn build<const D: usize>(
+        &self,
+        folder: &Path,
+        tolerance: Weld,
+        notes: &mut Vec<String>,
+    ) -> Result<Surface<D>, Error> {
         only_in::<D>(Dimension::Four, "spin", "")?;
         let axis = match self.plane.as_deref() {
             None | Some("xw") => 0,
@@ -58,9 +64,9 @@ impl SpinSpec {
         let input = Input::new("spin.mesh", folder, &self.mesh);
         let mesh = input.read()?;
         let (points, triangles) = match mesh.cells {
-            Cells::Triangles(triangles) => weld(&mesh.points, triangles),
+            Cells::Triangles(triangles) => tolerance.apply(&mesh.points, triangles, notes)?,
             Cells::Tetrahedra(tetrahedra) => {
-                let (points, tetrahedra) = weld(&mesh.points, tetrahedra);
+                let (points, tetrahedra) = tolerance.apply(&mesh.points, tetrahedra, notes)?;
                 let walls = solid(&points, tetrahedra).map_err(|message| input.wrong(message))?.boundary();
                 (points, walls.oriented())
             }

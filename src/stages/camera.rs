@@ -3,9 +3,16 @@
 //! The default eye is at 1 along the last axis and looks back along it at the origin, with the angle of view 90
 //! degrees: the image then lies in the hyperplane through the origin and covers -1 to 1 (thesis 4.6.1). `up` and
 //! `over` only have to be independent of the line of sight and of each other; the renderer makes them orthogonal.
+//!
+//! `camera: fit`, or `fit: true` beside other keys, leaves to the program where the eye is: [`super::fit`] finds it once the
+//! scene is known, and puts the camera that it finds in the place of the words.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Value, json};
 
 use super::Invalid;
@@ -35,6 +42,57 @@ pub struct CameraSpec {
     pub up: Option<Vec<f64>>,
     /// In 4D the direction that is over, +z in the image (default +z).
     pub over: Option<Vec<f64>>,
+    /// Whether the camera is placed so that the scene just fits the image (default `false`); `camera: fit` for short. The
+    /// direction from `target` to `eye`, `up`, `over` and the angle of view stay as they are; where the eye is, what it looks
+    /// at, and in a parallel projection `height`, follow from the scene.
+    pub fit: Option<bool>,
+    /// With `fit`: the share of the image that stays empty towards its edges, 0 to below 1 (default 0.05).
+    #[schemars(range(min = 0, max = 0.9))]
+    pub margin: Option<f64>,
+}
+
+/// The keys of a camera, or the word `fit`.
+struct FitOrKeys(CameraSpec);
+
+/// The word for a camera that is placed by the scene.
+const FIT: &str = "fit";
+/// The share of the image that is left empty around a scene that fits.
+const MARGIN: f64 = 0.05;
+
+impl<'de> Deserialize<'de> for FitOrKeys {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Camera;
+        impl<'de> Visitor<'de> for Camera {
+            type Value = CameraSpec;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the word `fit`, or a mapping such as {eye: [0, 0, 0, 2]}")
+            }
+
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<CameraSpec, E> {
+                match word {
+                    FIT => Ok(CameraSpec { fit: Some(true), ..CameraSpec::default() }),
+                    _ => Err(E::unknown_variant(word, &[FIT])),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<CameraSpec, A::Error> {
+                CameraSpec::deserialize(MapAccessDeserializer::new(map))
+            }
+        }
+        deserializer.deserialize_any(Camera).map(FitOrKeys)
+    }
+}
+
+/// Reads what is written as a camera.
+pub(super) fn fit_or_keys<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<CameraSpec>, D::Error> {
+    Ok(Option::<FitOrKeys>::deserialize(deserializer)?.map(|FitOrKeys(spec)| spec))
+}
+
+/// What may be written as a camera, for editors.
+pub(super) fn fit_or_keys_schema(generator: &mut SchemaGenerator) -> Schema {
+    let keys = generator.subschema_for::<CameraSpec>();
+    json_schema!({ "anyOf": [{ "const": FIT }, keys] })
 }
 
 /// How rays leave the eye.
@@ -61,6 +119,9 @@ pub struct CameraPlan {
     pub up: Vec<f64>,
     /// In 4D, independent of the line of sight and of `up`.
     pub over: Option<Vec<f64>>,
+    /// Until the scene is known: that the eye is to be placed by it, and the share of the image that is to stay empty.
+    #[serde(skip)]
+    pub fit: Option<f64>,
 }
 
 /// How rays leave the eye.
@@ -87,7 +148,18 @@ impl CameraPlan {
             ProjectionPlan::Parallel { height } => (Projection::Parallel, None, Some(height)),
         };
         let [eye, target, up] = [&self.eye, &self.target, &self.up].map(|v| Some(v.clone()));
-        CameraSpec { projection: Some(projection), eye, target, field_of_view, height, up, over: self.over.clone() }
+        let over = self.over.clone();
+        CameraSpec {
+            projection: Some(projection),
+            eye,
+            target,
+            field_of_view,
+            height,
+            up,
+            over,
+            fit: None,
+            margin: None,
+        }
     }
 
     /// As it is written in a pipeline, nothing left out.
@@ -144,12 +216,19 @@ pub(super) fn plan(
         }
     };
 
+    let fit = fit(spec, path)?;
     let mut unused = |key: &str, given: Option<f64>, projection: &str| {
         if given.is_some() {
             let message = format!("has no use in a {projection} projection");
             warnings.push(Invalid::new(format!("{path}.{key}"), message));
         }
     };
+    if fit.is_some() && spec.projection == Some(Projection::Parallel) {
+        unused("height", spec.height, "fitted");
+    }
+    if fit.is_none() {
+        unused("margin", spec.margin, "fixed");
+    }
     let projection = match spec.projection.unwrap_or_default() {
         Projection::Perspective => {
             unused("height", spec.height, "perspective");
@@ -167,7 +246,16 @@ pub(super) fn plan(
             ProjectionPlan::Parallel { height }
         }
     };
-    Ok(CameraPlan { projection, eye, target, up, over })
+    Ok(CameraPlan { projection, eye, target, up, over, fit })
+}
+
+/// The share of the image that is to stay empty, if the camera is to be placed by the scene.
+fn fit(spec: &CameraSpec, path: &str) -> Result<Option<f64>, Invalid> {
+    let margin = spec.margin.unwrap_or(MARGIN);
+    if !(0.0..=0.9).contains(&margin) {
+        return Err(Invalid::new(format!("{path}.margin"), format!("expected 0 to 0.9, found {}", number(margin))));
+    }
+    Ok(spec.fit.unwrap_or(false).then_some(margin))
 }
 
 /// The camera of a plan.

@@ -106,9 +106,6 @@ pub struct LightingPlan {
     pub shininess: f64,
     /// What distance does, if anything.
     pub depth_cue: Option<DepthCuePlan>,
-    /// Whether anything has highlights.
-    #[serde(skip)]
-    is_glossy: bool,
 }
 
 /// A light.
@@ -182,7 +179,7 @@ pub(super) fn plan(
         unused("shininess", "has no effect without `lights` and `specular`");
     }
     let is_lit = !lights.is_empty() || keys.ambient.is_some() || depth_cue.is_some() || sky.is_some() || bounce;
-    Ok(is_lit.then_some(LightingPlan { lights, ambient, sky, bounce, specular, shininess, depth_cue, is_glossy }))
+    Ok(is_lit.then_some(LightingPlan { lights, ambient, sky, bounce, specular, shininess, depth_cue }))
 }
 
 /// Whether the light of other surfaces is followed.
@@ -312,7 +309,8 @@ impl LightingPlan {
         if !self.lights.is_empty() {
             written.insert("lights".to_owned(), self.lights.iter().map(light).collect());
             written.insert("specular".to_owned(), self.specular.into());
-            if self.is_glossy {
+            // Objects may have highlights that follow it.
+            if self.specular > 0.0 || self.shininess != SHININESS {
                 written.insert("shininess".to_owned(), self.shininess.into());
             }
         }

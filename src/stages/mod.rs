@@ -1,5 +1,5 @@
 //! The stages of a pipeline, one file each: `scene`, `occlusion`, `render`, `write`, `paraview`, `mesh`, `slice`,
-//! `wireframe`, `animate`, `shade`.
+//! `wireframe`, `animate`, `shade`, `page`.
 //!
 //! A stage's file holds all there is to know of it: what is written in YAML (its `Spec`), what is understood of that
 //! (its `Plan`: checked, resolved, every default filled in), its part of the key that tells whether a file is fresh, its
@@ -19,6 +19,7 @@
 //! - a `wireframe` works on the scene of a render, and looks through its camera;
 //! - an `animate` works on a render, whose picture it makes again and again while something moves;
 //! - a `shade` works on an image in a file;
+//! - a `page` works on writes and animations, all earlier ones if it doesn't say which;
 //! - a `paraview` figure works on writes, which it finds also by the name of their render, and on animations.
 
 pub mod animate;
@@ -26,6 +27,7 @@ pub mod camera;
 pub mod cut;
 pub mod describe;
 mod error;
+pub(crate) mod fit;
 pub mod key;
 pub mod lighting;
 pub mod memory;
@@ -33,6 +35,7 @@ pub mod mesh;
 mod names;
 pub mod occlusion;
 mod one_or_many;
+pub mod page;
 pub mod paraview;
 mod picture;
 pub mod piece;
@@ -391,4 +394,6 @@ stages! {
     Animate: animate::AnimateSpec => animate::AnimatePlan;
     /// Ambient occlusion for an image that is there already.
     Shade: shade::ShadeSpec => shade::ShadePlan;
+    /// One HTML file that shows images in a browser.
+    Page: page::PageSpec => page::PagePlan;
 }

@@ -338,6 +338,11 @@ fn remove(run: &mut Run, file: &Path) -> Result<(), StageError> {
 }
 
 impl OcclusionPlan {
+    /// Whether its values are read from a file.
+    pub fn is_loaded(&self) -> bool {
+        matches!(self.source, OcclusionSource::Load(_))
+    }
+
     /// Where the standard errors of the values are kept: in `NAME.error.f32` beside `NAME.f32`. None if there is no file,
     /// or no error.
     fn errors_file(&self) -> Option<PathBuf> {

@@ -204,7 +204,7 @@ impl Shown {
     }
 
     /// The render that it is an image of.
-    fn render(self, plan: &Plan) -> Option<Ref<RenderPlan>> {
+    pub(super) fn render(self, plan: &Plan) -> Option<Ref<RenderPlan>> {
         match self {
             Self::Image(write) => Some(plan[write].render),
             Self::Animation(animation) => Some(plan[animation].render),
@@ -213,7 +213,7 @@ impl Shown {
     }
 
     /// What its files hold.
-    fn arrays(self, plan: &Plan) -> &[Aov] {
+    pub(super) fn arrays(self, plan: &Plan) -> &[Aov] {
         match self {
             Self::Image(write) => &plan[write].arrays,
             Self::Animation(animation) => &plan[animation].arrays,

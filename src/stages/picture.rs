@@ -48,7 +48,7 @@ impl RenderPlan {
             columns |= Columns::POSITION | Columns::NORMAL | Columns::OCCLUSION;
             (whole, holds) = (size_of::<f32>() as u64, "one layer of its picture and the depth of all of it");
             if render.lighting.as_ref().is_some_and(|lighting| lighting.bounce) {
-                (whole, holds) = (4 * whole, "one layer of its picture, and of all of it the depth and the light");
+                (whole, holds) = (8 * whole, "one layer of its picture, and of all of it the depth and the light");
             }
         }
         if render.denoise {
@@ -261,9 +261,10 @@ fn filters_of<const D: usize>(plan: &Plan, render: &RenderPlan, picture: &Render
 pub(super) fn nothing_seen<const D: usize>(picture: &Renderer<D>) -> String {
     let behind = |v: &u32| picture.camera.project(&picture.tracer().mesh().vertices[*v as usize]).1 <= 0.0;
     if picture.tracer().mesh().simplices.iter().flatten().all(behind) {
-        "the scene lies wholly behind the camera; turn the camera, or move it back"
+        "the scene lies wholly behind the camera; let `camera: fit` place it, or turn it, or move it back"
     } else {
-        "no voxel's centre sees any of the scene; look at its place and size, or use more voxels"
+        "no voxel's centre sees any of the scene; let `camera: fit` place the camera, look at the scene's place and size, or \
+         use more voxels"
     }
     .to_owned()
 }

@@ -51,7 +51,9 @@ pub struct RenderSpec {
     pub occlusion: Option<String>,
     /// With `occlusion: screen_space`: how it is looked for.
     pub screen_space: Option<ScreenSpaceSpec>,
-    /// Where it is seen from.
+    /// Where it is seen from; `fit` from where the scene just fits the image.
+    #[serde(default, deserialize_with = "camera::fit_or_keys")]
+    #[schemars(schema_with = "camera::fit_or_keys_schema")]
     pub camera: Option<CameraSpec>,
     /// Voxels along x, y and z; in 3D pixels along x and y.
     pub dimensions: Vec<u64>,

@@ -13,7 +13,7 @@ use super::camera::camera;
 use super::describe::{Counts, grouped};
 use super::render::RenderPlan;
 use super::{Invalid, LeftOut, Plan, Ref, Resolver, Stage};
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, Vector64};
 use crate::mesh::{Mesh, MeshBuilder, Orientation, Surface};
 use crate::progress::Progress;
 use crate::scene::{self, ObjectSpec, TransformStep, build_object_watched};
@@ -276,6 +276,17 @@ impl<const D: usize> Bodies<D> {
         // What there is to tell of them was told when the scene was built.
         let surfaces: Result<_, _> = objects.map(|i| surface(plan, scene, i, &mut Vec::new(), progress)).collect();
         Ok(Self { scene, surfaces: surfaces? })
+    }
+
+    /// The points that simplices use.
+    pub fn used_points(&self) -> Vec<Vector64<D>> {
+        let mut points = Vec::new();
+        for surface in &self.surfaces {
+            let mut used = vec![false; surface.vertices.len()];
+            surface.simplices.iter().flatten().for_each(|&v| used[v as usize] = true);
+            points.extend(surface.vertices.iter().zip(&used).filter(|(_, used)| **used).map(|(point, _)| *point));
+        }
+        points
     }
 
     /// The scene with these objects moved on by these steps; the same as if the steps stood at the end of their `transform`.

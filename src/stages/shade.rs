@@ -124,6 +124,10 @@ impl Stage for ShadePlan {
                 resolver.warn(format!("{path}.dimension"), "has no effect without `camera`: the image tells its own");
                 None
             }
+            (Some(CameraSpec { fit: Some(true), .. }), _) => {
+                let message = "there is no scene that it could be fitted to; say where the image was seen from";
+                return Err(Invalid::new(format!("{path}.camera.fit"), message));
+            }
             (Some(camera), dimension) => {
                 let number = dimension.unwrap_or(4);
                 let dimension = Dimension::new(number).ok_or_else(|| {
@@ -375,6 +379,7 @@ impl ShadePlan {
         if self.arrays != [Aov::AmbientOcclusion] {
             depth_image = depth_image.directed();
         }
+        let normal = |n: usize| Vector::<D>::from_fn(|r, _| normals.get(D * n + r) as f32);
         let look = |image: &DepthImage<D>| -> Result<Vec<Option<Option<Seen<D>>>>, StageError> {
             let mut found = vec![None; grid.len()];
             let width = grid.dimensions[0];
@@ -385,8 +390,7 @@ impl ShadePlan {
                 for (i, found) in found.iter_mut().enumerate() {
                     let n = row * width + i;
                     if image.shows(n) {
-                        let normal = Vector::<D>::from_fn(|r, _| normals.get(D * n + r) as f32);
-                        *found = Some(image.seen_at(&normal, grid.index(n)));
+                        *found = Some(image.seen_at(&normal(n), grid.index(n)));
                     }
                 }
                 progress.advance(width as u64);
@@ -399,16 +403,16 @@ impl ShadePlan {
         let mut found = look(&depth_image)?;
         if self.bounce {
             let colors = self.albedo.as_ref().and_then(|name| image.volume.array(name));
-            let light = |(n, seen): (usize, &Option<Option<Seen<D>>>)| match seen {
-                None => [0.0; 3],
-                // What has no normal is left open.
-                Some(seen) => {
-                    let arrives = seen.as_ref().map_or(1.0, sky);
-                    reflectance(colors.map_or(GREY, |array| color(array, n))).map(|c| (c * arrives) as f32)
+            let light = |(n, seen): (usize, &Option<Option<Seen<D>>>)| {
+                if seen.is_none() {
+                    return ([0.0; 3], Vector::zeros());
                 }
+                // What has no normal is left open.
+                let arrives = seen.as_ref().and_then(|seen| seen.as_ref()).map_or(1.0, sky);
+                let light = reflectance(colors.map_or(GREY, |array| color(array, n))).map(|c| (c * arrives) as f32);
+                (light, normal(n))
             };
-            let light = found.par_iter().enumerate().map(light).collect();
-            depth_image = depth_image.lit(light);
+            depth_image = depth_image.lit(found.par_iter().enumerate().map(light).collect());
             found = look(&depth_image)?;
         }
         let of_points = |value: &(dyn Fn(Option<&Seen<D>>) -> Vec<f32> + Sync)| -> Vec<f32> {

@@ -78,11 +78,6 @@ impl Accumulator {
         Self { groups: Groups::new(), even_in: (sampler == Sampler::Sobol).then_some(dimension) }
     }
 
-    /// Whether the order of the next 64 rays matters: groups are smaller than that.
-    pub fn is_fine(&self) -> bool {
-        self.groups.size() < u64::BITS
-    }
-
     /// The next `count` rays; the lowest bits of `open` tell which of them escape.
     pub fn add(&mut self, mut open: u64, mut count: u32) {
         while count > 0 {

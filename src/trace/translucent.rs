@@ -8,10 +8,12 @@
 //! At a vertex the simplices around it hide cones of directions. A ray that starts in them begins below a surface, and loses
 //! what one surface takes, once for each object there. What takes nothing counts as not being there.
 //!
-//! Everything here is ray by ray, without SIMD; scenes of opaque objects never come here.
+//! Packets tell which rays hit nothing at all; the others are looked at here ray by ray, without SIMD. Scenes of opaque objects never
+//! come here.
 
 use rayon::prelude::*;
 
+use super::cpu::PacketTracer;
 use super::estimate::Estimate;
 use super::shares::Shares;
 use super::surroundings::star_cone;
@@ -21,6 +23,8 @@ use crate::geometry::{Cone, Dimension, Frame, Ray, Vector};
 use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress};
 
+/// Points that a thread takes at a time.
+const BATCH: usize = 16;
 /// Rays between two looks at whether to go on.
 const RAYS_BETWEEN_LOOKS: u32 = 1 << 8;
 
@@ -31,13 +35,39 @@ pub(super) fn open_fractions<const D: usize>(
     sampling: &Sampling,
     progress: &dyn Progress,
 ) -> Result<Vec<Estimate>, Cancelled> {
-    tracer.prepare();
-    let estimate = |point| {
-        let found = estimate_at(tracer, point, sampling, progress)?;
-        progress.advance(1);
-        Ok(found)
-    };
-    points.par_iter().map(estimate).collect()
+    tracer.prepare_wide();
+    // What takes nothing is hit by packets all the same, and counts at vertices for the ways they are approached.
+    let has_nothing = tracer.mesh().objects.iter().any(|object| object.opacity <= 0.0);
+    let found = points.par_chunks(BATCH).map_init(PacketTracer::default, |packets, points| {
+        let estimate = |point| {
+            let found = match has_nothing || sampling.target.is_some() {
+                true => estimate_at(tracer, point, sampling, progress)?,
+                false => estimate_by(packets, tracer, point, sampling, progress)?,
+            };
+            progress.advance(1);
+            Ok(found)
+        };
+        points.iter().map(estimate).collect::<Result<Vec<_>, Cancelled>>()
+    });
+    Ok(found.collect::<Result<Vec<_>, Cancelled>>()?.concat())
+}
+
+/// The value at one point, of as many rays as the sampling says: [`estimate_at`]'s, bit for bit.
+fn estimate_by<const D: usize>(
+    packets: &mut PacketTracer<D>,
+    tracer: &Tracer<D>,
+    point: &ShadingPoint<D>,
+    sampling: &Sampling,
+    progress: &dyn Progress,
+) -> Result<Estimate, Cancelled> {
+    let rays = Rays::of(tracer, point, sampling);
+    if rays.normal.amax() == 0.0 {
+        return Ok(Estimate::known(1.0));
+    }
+    let mut shares = Shares::new(sampling.sampler, Dimension::of::<D>());
+    let mut watch = |direction, is_open| shares.add(if is_open { 1.0 } else { rays.share(direction) });
+    packets.watched(tracer, point, sampling, &mut watch, progress)?;
+    Ok(shares.estimate())
 }
 
 /// The value at one point.
@@ -47,24 +77,47 @@ pub(super) fn estimate_at<const D: usize>(
     sampling: &Sampling,
     progress: &dyn Progress,
 ) -> Result<Estimate, Cancelled> {
-    let (position, normal) = (point.position(tracer.mesh()), point.normal(tracer.mesh()));
-    if normal.amax() == 0.0 {
+    let rays = Rays::of(tracer, point, sampling);
+    if rays.normal.amax() == 0.0 {
         return Ok(Estimate::known(1.0));
     }
-    let (star, ignored, frame) = (star(tracer, point, normal), point.ignored(tracer), Frame::new(&normal));
+    let frame = Frame::new(&rays.normal);
     let mut sequence = Sequence::new(sampling.sampler, sampling.seed, point.number());
     let mut shares = Shares::new(sampling.sampler, Dimension::of::<D>());
     while shares.rays() < sampling.samples && !sampling.target.is_some_and(|target| shares.meet(&target)) {
         if shares.rays().is_multiple_of(RAYS_BETWEEN_LOOKS) && progress.cancelled() {
             return Err(Cancelled);
         }
-        let ray = Ray::new(position, sequence.next_direction(&frame));
-        let hides = |around: &&Around<D>| around.cones.iter().any(|cone| cone.contains(&ray.direction));
-        let near: f64 = star.iter().filter(hides).map(|around| around.passed).product();
-        let far = || tracer.transmitted(&ray, sampling.max_distance, |simplex| ignored.contains(&simplex));
-        shares.add(if near > 0.0 { near * far() } else { 0.0 });
+        shares.add(rays.share(sequence.next_direction(&frame)));
     }
     Ok(shares.estimate())
+}
+
+/// All that decides what rays from a point bring.
+struct Rays<'t, const D: usize> {
+    tracer: &'t Tracer<D>,
+    position: Vector<D>,
+    normal: Vector<D>,
+    limit: f32,
+    star: Vec<Around<D>>,
+    ignored: Vec<u32>,
+}
+
+impl<'t, const D: usize> Rays<'t, D> {
+    fn of(tracer: &'t Tracer<D>, point: &ShadingPoint<D>, sampling: &Sampling) -> Self {
+        let (position, normal) = (point.position(tracer.mesh()), point.normal(tracer.mesh()));
+        let star = if normal.amax() == 0.0 { Vec::new() } else { star(tracer, point, normal) };
+        Self { tracer, position, normal, limit: sampling.max_distance, star, ignored: point.ignored(tracer) }
+    }
+
+    /// The share of light that passes along a ray.
+    fn share(&self, direction: Vector<D>) -> f64 {
+        let ray = Ray::new(self.position, direction);
+        let hides = |around: &&Around<D>| around.cones.iter().any(|cone| cone.contains(&ray.direction));
+        let near: f64 = self.star.iter().filter(hides).map(|around| around.passed).product();
+        let far = || self.tracer.transmitted(&ray, self.limit, |simplex| self.ignored.contains(&simplex));
+        if near > 0.0 { near * far() } else { 0.0 }
+    }
 }
 
 /// What an object hides around a vertex, and what share of light passes it.

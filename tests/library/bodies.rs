@@ -779,7 +779,7 @@ fn slices_and_wireframes_are_refused_by_name() {
             "pole: the pole of the projection, from the centre in direction [0.0, 0.0, 1.0, 0.0], lies on what is shown of",
         ),
         (
-            "wireframe: {vtp: a.vtp, projection: stereographic, center: [0.5, 0.5, 0.5, 0]}",
+            "wireframe: {vtp: a.vtp, projection: stereographic, center: [0.5, 0.5, 0.5, 0], pole: [1, 1, 1, 0.2]}",
             "center: the centre of the projection, [0.5, 0.5, 0.5, 0.0], lies on what is shown of",
         ),
         ("wireframe: {vtp: a.vtp, projection: plane}", "projection: edges lie in no common hyperplane"),
@@ -841,7 +841,7 @@ fn peels_of_a_hypersphere_are_the_tori_of_hopf() {
             let triangle = |face: &[u32; 3]| {
                 let [a, b, c] = face.map(|i| points[i as usize]);
                 let (u, v) = (b - a, c - a);
-                0.5 * (u.norm_squared() * v.norm_squared() - u.dot(&v).powi(2)).sqrt()
+                0.5 * (u.norm_squared() * v.norm_squared() - u.dot(&v).powi(2)).max(0.0).sqrt()
             };
             let area: f64 = found.faces.iter().map(triangle).sum();
             let (sine, cosine) = degrees.to_radians().sin_cos();

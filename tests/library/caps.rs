@@ -142,7 +142,9 @@ fn surfaces_without_an_inside_are_refused() {
     pushed.vertices.iter_mut().filter(|v| inner(v[0]) && inner(v[1]) && v[2] == 1.0).for_each(|v| v[2] = -0.5);
     let mut flat = cube(0.0, 1.0, 1);
     flat.vertices.iter_mut().for_each(|v| v[2] = 0.0);
+    let overlapping = together(cube(0.0, 1.0, 2), &cube(0.6, 1.5, 1));
     for (surface, message) in [
+        (overlapping, "passes through itself, or has bodies that overlap: the triangles at ("),
         (open, "is open at 3 edges: caps need a closed surface; repair it, or write caps: false for walls only"),
         (pushed, "passes through itself"),
         (flat, "encloses nothing"),
@@ -271,19 +273,50 @@ fn parts_with_flat_faces_take_few_pieces() {
     let cavities = together(cube(0.0, 1.0, 4), &turned(cube(0.1, 0.4, 2)));
     let cavities = together(cavities, &turned(cube(0.6, 0.9, 2)));
     let nested = together(together(cube(0.0, 1.0, 2), &turned(cube(0.2, 0.8, 2))), &cube(0.4, 0.6, 2));
-    for (name, surface) in [("plate", shape(plate)), ("frame", frame), ("cavities", cavities), ("nested", nested)] {
+    for (name, surface, most) in [
+        ("plate", shape(plate), 30),
+        ("frame", frame, 30),
+        ("cavities", cavities, 30),
+        ("nested", nested, 30),
+        ("gear", gear(20), 15),
+    ] {
         for degrees in [0.0, 20.0, 133.0] {
             let surface = askew(surface.clone(), degrees, degrees / 50.0);
             let (tetrahedra, _) = check(&format!("{name} {degrees}"), &surface);
             assert!(turned_over(&capped(&surface).unwrap()).is_empty());
             let filling = (tetrahedra - 3 * surface.simplices.len()) / 2;
             assert!(
-                filling <= 30 * surface.simplices.len(),
+                filling <= most * surface.simplices.len(),
                 "{name} {degrees}: {filling} of {}",
                 surface.simplices.len()
             );
         }
     }
+}
+
+/// A gear with a round hole: a ring of prisms, four a tooth.
+fn gear(teeth: u32) -> Surface<3> {
+    let count = 4 * teeth;
+    let mut vertices = Vec::new();
+    for height in [0.0, 0.3] {
+        for i in 0..count {
+            let turn = (f64::from(i / 4) + [0.0, 0.35, 0.5, 0.85][(i % 4) as usize]) / f64::from(teeth);
+            let (sine, cosine) = libm::sincos(std::f64::consts::TAU * turn);
+            let outer = if i % 4 < 2 { 0.85 } else { 1.0 };
+            vertices.extend([outer, 0.3].map(|r| Vector64::from([r * cosine, r * sine, height])));
+        }
+    }
+    let mut simplices = Vec::new();
+    for i in 0..count {
+        let [a, b] = [2 * i, 2 * ((i + 1) % count)];
+        let [top, next] = [a + 2 * count, b + 2 * count];
+        for [p, q, r, s] in
+            [[a, b, next, top], [b + 1, a + 1, top + 1, next + 1], [top, next, next + 1, top + 1], [b, a, a + 1, b + 1]]
+        {
+            simplices.extend([[p, q, r], [p, r, s]]);
+        }
+    }
+    Surface { vertices, simplices, normals: None }
 }
 
 fn scaled(mut surface: Surface<3>, by: f64) -> Surface<3> {

@@ -39,6 +39,7 @@ stages:
   - render: {id: space, occlusion: screen_space, screen_space: {slices: 8, steps: 8, thickness: 1, max_distance: 2}, dimensions: [3, 4, 5], input: s}
   - write: {id: w4, input: space, vti: d.vti}
   - shade: {id: sh, image: v.vti, depth: depth, normal: normal, dimension: 4, camera: {field_of_view: 80}, screen_space: {slices: 4}, arrays: [irradiance], sky: {gradient: [0, 0.5, 0, 0]}, bounce: 1, albedo: rgba, vti: s.vti}
+  - page: {id: pg, input: [w, an], html: p.html, title: One}
   - paraview: {id: f, input: w, state: a.py, screenshot: b.png, reader: vti, cut: none, size: [100, 100]}
 ";
 
@@ -49,6 +50,9 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("PipelineSpec.seed", Ok("seed=3")),
     ("PipelineSpec.program", Err("tells who wrote the pipeline, and warns")),
     ("PipelineSpec.folder", Err("where inputs are; their content takes part")),
+    ("PipelineSpec.variables", Err("are in their places before anything is understood")),
+    ("PipelineSpec.include", Err("are in their places before anything is understood")),
+    ("PipelineSpec.sweep", Err("makes pipelines, each with keys of its own")),
     ("PipelineSpec.inputs", Err("what inputs must be; what they are takes part")),
     ("PipelineSpec.stages", Err("the stages follow")),
     ("SceneSpec.id", Err("a name for other stages")),
@@ -105,6 +109,12 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("CameraSpec.height", Ok("parallel.camera.height=3")),
     ("CameraSpec.up", Ok("r.camera.up=[1, 1, 0, 0]")),
     ("CameraSpec.over", Ok("r.camera.over=[1, 0, 1, 0]")),
+    ("CameraSpec.fit", Ok("r.camera.fit=true")),
+    ("CameraSpec.margin", Err("with `fit` it decides where the eye is; see `a_fitted_camera_s_margin_counts`")),
+    ("PageSpec.id", Err("a name for other stages")),
+    ("PageSpec.input", Ok("pg.input=[w]")),
+    ("PageSpec.html", Err("a file doesn't depend on its name")),
+    ("PageSpec.title", Ok("pg.title=Two")),
     ("WriteSpec.id", Err("a name for other stages")),
     ("WriteSpec.input", Ok("w.input=parallel")),
     ("WriteSpec.vti", Err("a file doesn't depend on its name")),
@@ -295,6 +305,17 @@ fn a_scene_s_dimension_counts() {
     let text = "name: p\nstages:\n  - scene: {dimension: 4, objects: []}\n  - occlusion: {file: a.f32}\n";
     let (four, three) = (keys(folder.path(), text, &[]), keys(folder.path(), text, &["scene.dimension=3"]));
     assert_eq!(differing(&four, &three).len(), 1);
+}
+
+#[test]
+fn a_fitted_camera_s_margin_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "name: p\nstages:\n  - scene: {objects: [{tesseract: {size: 1}}]}\n  - render: {camera: {fit: true}, dimensions: [3, 3, 3]}\n  - write: {raw: a.raw}\n";
+    let before = keys(folder.path(), text, &[]);
+    assert_eq!(before, keys(folder.path(), text, &["render.camera=fit"]));
+    assert_eq!(before, keys(folder.path(), text, &["render.camera.margin=0.05"]));
+    assert_eq!(differing(&before, &keys(folder.path(), text, &["render.camera.margin=0.2"])).len(), 1);
+    assert_eq!(differing(&before, &keys(folder.path(), text, &["scene.objects[0].tesseract.size=2"])).len(), 1);
 }
 
 #[test]

@@ -414,3 +414,43 @@ fn small_files_that_ask_for_all_memory_are_told_before() {
     std::fs::write(&path, bytes).unwrap();
     assert!(Info::read(Path::new(&path)).is_err());
 }
+
+#[test]
+fn points_that_differ_by_rounding_are_welded_within_a_tolerance() {
+    let folder = Folder::new();
+    // Each triangle has corners of its own, a little off.
+    let mut text = String::new();
+    for (i, corner) in TRIANGLES.as_flattened().iter().enumerate() {
+        let [x, y, z] = CORNERS[*corner].map(|x| f64::from(x) + 1e-6 * (i % 7) as f64);
+        text += &format!("v {x} {y} {z}\n");
+    }
+    (0..TRIANGLES.len()).for_each(|i| text += &format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3));
+    let open = folder.read("a.obj", &text).unwrap();
+    assert_eq!(facet_pairs(&open.simplices).open, 36);
+    let welded = |weld: f64, shape: serde_json::Value| {
+        let mut object = shape;
+        object["weld"] = weld.into();
+        let mut notes = Vec::new();
+        let spec = serde_json::from_value(object).unwrap();
+        (ao4d::scene::build_object_with_notes::<3>(&spec, folder.0.path(), &mut notes), notes)
+    };
+    let (closed, notes) = welded(1e-5, json!({"file": "a.obj"}));
+    let closed = closed.unwrap();
+    assert_eq!((closed.vertices.len(), closed.simplices.len()), (8, 12));
+    assert!(facet_pairs(&closed.simplices).is_closed());
+    assert_eq!(notes, ["weld: 28 points became one with others, or belong to nothing"]);
+    for (weld, shape, message) in [
+        (-1.0, json!({"file": "a.obj"}), "weld: -1 is below 0"),
+        (0.5, json!({"file": "a.obj"}), "weld: 0.5 is more than a hundredth of the mesh's extent"),
+        (1e-5, json!({"sphere": {"radius": 1}}), "weld: a sphere has no points to weld"),
+    ] {
+        let error = welded(weld, shape).0.unwrap_err().to_string();
+        assert!(error.starts_with(message), "{error}");
+    }
+    let spec = |weld: f64| {
+        let object = json!({"extrude": {"mesh": "a.obj", "from": 0, "to": 1, "caps": true}, "weld": weld});
+        build_object::<4>(&serde_json::from_value(object).unwrap(), folder.0.path())
+    };
+    assert!(spec(0.0).unwrap_err().to_string().contains("is open at 36 edges"));
+    assert!(facet_pairs(&spec(1e-5).unwrap().simplices).is_closed());
+}

@@ -138,6 +138,63 @@ fn images_compare() {
 }
 
 #[test]
+fn folders_are_compared_file_by_file_and_reported() {
+    let folder = Folder::new();
+    let image = |shift: f32| {
+        let grid = Grid { dimensions: [3, 2, 2], origin: [0.0; 3], spacing: [1.0; 3] };
+        let occlusion: Vec<f32> = (0..12).map(|i| i as f32 / 16.0 + if i == 7 { shift } else { 0.0 }).collect();
+        let opacity = vec![1.0f32; 12];
+        let arrays = vec![Array::new("ambient_occlusion", 1, occlusion), Array::new("opacity", 1, opacity)];
+        vti(&Volume { grid, arrays, field_data: Vec::new() })
+    };
+    for name in ["old", "new"] {
+        std::fs::create_dir(folder.0.path().join(name)).unwrap();
+        folder.write(&format!("{name}/same.vti"), &image(0.0));
+    }
+    folder.write("old/a.vti", &image(0.0));
+    folder.write("new/a.vti", &image(0.125));
+    folder.write("new/figure.py", b"1");
+    let reports = ["--junit", "r/j.xml", "--markdown", "r/m.md", "--pictures", "r/p", "-q"];
+    let (code, text) = folder.says(&[&["compare", "new", "old", "--json"], &reports[..]].concat());
+    let json: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((code, &json["same"]), (1, &json!(false)));
+    let files: Vec<(&str, bool)> =
+        json["files"].as_array().unwrap().iter().map(|f| (f["file"].as_str().unwrap(), f["same"] == true)).collect();
+    assert_eq!(files, [("a.vti", false), ("figure.py", false), ("same.vti", true)]);
+    let at = &json["files"][0]["arrays"][0]["at"];
+    assert_eq!((&at["a"], &at["b"], &at["voxel"]), (&json!(0.5625), &json!(0.4375), &json!([1, 0, 1])));
+    let read = |name: &str| std::fs::read_to_string(folder.0.path().join(name)).unwrap();
+    assert!(read("r/j.xml").contains("<testsuite name=\"ao4d compare\" tests=\"3\" failures=\"2\""));
+    let markdown = read("r/m.md");
+    assert!(markdown.contains("| a.vti | ambient\\_occlusion | 1 of 12 | 1.250e-1 |"), "{markdown}");
+    assert!(markdown.contains("![a.vti](p/a.vti.png)") && markdown.contains("Same: same.vti."), "{markdown}");
+    let picture = std::fs::read(folder.0.path().join("r/p/a.vti.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG"));
+    // Array by array, as the file says; a tolerance for another array doesn't help.
+    for (tolerances, code) in [
+        ("arrays: {ambient_occlusion: {atol: 0.125}}\nignore: ['*.py']\n", 0),
+        ("arrays: {ambient_occlusion: {max_different: 1}}\nignore: [figure.py]\n", 0),
+        ("arrays: {opacity: {atol: 0.125}}\nignore: ['*.py']\n", 1),
+        ("default: {atol: 0.125}\narrays: {ambient_occlusion: {atol: 0.1}}\nignore: ['*.py']\n", 1),
+        ("arrays: {ambient_occlusion: {atol: 0.125}}\n", 1),
+    ] {
+        folder.write("t.yaml", tolerances.as_bytes());
+        assert_eq!(folder.says(&["compare", "new", "old", "--tolerances", "t.yaml"]).0, code, "{tolerances}");
+    }
+    folder.write("t.yaml", b"arrays: {x: {atol: 1, atoll: 2}}\n");
+    let (code, text) = folder.says(&["compare", "new", "old", "--tolerances", "t.yaml"]);
+    assert!(code == 2 && text.contains("t.yaml: expected tolerances") && text.contains("atoll"), "{text}");
+    assert_eq!(folder.says(&["compare", "new", "old/a.vti"]).0, 2);
+    // A file of its own may have tolerances and reports as well.
+    folder.write("t.yaml", b"arrays: {ambient_occlusion: {atol: 0.125}}\n");
+    assert_eq!(
+        folder.says(&["compare", "new/a.vti", "old/a.vti", "--tolerances", "t.yaml", "--junit", "j.xml", "-q"]).0,
+        0
+    );
+    assert!(read("j.xml").contains("failures=\"0\""));
+}
+
+#[test]
 fn occlusion_files_and_raw_ones() {
     let folder = Folder::new();
     let floats = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();

@@ -7,5 +7,6 @@ mod cli_run;
 mod cli_schema;
 mod hostile;
 mod inspect;
+mod page;
 mod reference;
 mod study;

@@ -60,7 +60,7 @@ pub fn fill(tree: &mut Node, json: &Json) {
 }
 
 /// JSON as a tree, without the keys that have no value.
-fn from_json(json: &Json) -> Value {
+pub fn from_json(json: &Json) -> Value {
     match json {
         Json::Null => Value::Null,
         Json::Bool(b) => Value::Bool(*b),

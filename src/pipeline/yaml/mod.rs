@@ -17,7 +17,7 @@ mod path;
 mod problem;
 
 pub(super) use decode::decode;
-pub(super) use emit::{emit, fill, map, node};
+pub(super) use emit::{emit, fill, from_json, map, node};
 pub(super) use parse::parse;
 pub(super) use path::{Segment, parse_path, show_path};
 pub(super) use problem::Problem;
@@ -39,6 +39,15 @@ pub(super) enum Origin {
     },
     /// In the command line's override of this number, counted from 0.
     Set(usize),
+    /// In the included file of this number, counted from 0.
+    Included {
+        /// Its number.
+        file: usize,
+        /// The line.
+        line: usize,
+        /// The column.
+        column: usize,
+    },
 }
 
 /// A value and where it stands.
@@ -102,6 +111,25 @@ impl Node {
         match &self.value {
             Value::List(items) => items,
             _ => &[],
+        }
+    }
+
+    /// Marks the whole subtree as coming from the included file of this number.
+    pub fn included(&mut self, file: usize) {
+        let moved = |origin: Origin| match origin {
+            Origin::File { line, column } => Origin::Included { file, line, column },
+            other => other,
+        };
+        self.origin = moved(self.origin);
+        match &mut self.value {
+            Value::List(items) => items.iter_mut().for_each(|item| item.included(file)),
+            Value::Map(entries) => {
+                for entry in entries {
+                    entry.origin = moved(entry.origin);
+                    entry.value.included(file);
+                }
+            }
+            _ => {}
         }
     }
 

@@ -41,6 +41,12 @@ impl Problem {
         self
     }
 
+    /// With this place, whatever was known.
+    pub fn at(mut self, origin: Origin) -> Self {
+        self.origin = Some(origin);
+        self
+    }
+
     /// As it looks one step further out.
     pub fn inside(mut self, segment: Segment) -> Self {
         self.path.push(segment);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::DepthImage;
-use crate::geometry::{Vector64, widen};
+use crate::geometry::{Vector, Vector64, widen};
 use crate::mesh::Mesh;
 use crate::occlusion::Error;
 use crate::progress::Progress;
@@ -50,19 +50,20 @@ pub(in crate::render) fn occlude<const D: usize>(
 }
 
 /// The light that leaves what the voxels of a buffer show, under a sky of this gradient, once [`occlude`] has found where
-/// the sky is open: the reflectance times A + g . b. Black where nothing is.
+/// the sky is open: the reflectance times A + g . b; with the normal. Black where nothing is.
 pub(in crate::render) fn radiosity<const D: usize>(
     mesh: &Mesh<D>,
     buffer: &GBuffer<D>,
     gradient: &Vector64<D>,
-) -> Vec<[f32; 3]> {
+) -> Vec<([f32; 3], Vector<D>)> {
     let light = |i: usize| {
         let simplex = buffer.simplex[i];
         if simplex == NOTHING {
-            return [0.0; 3];
+            return ([0.0; 3], Vector::zeros());
         }
         let arrives = f64::from(buffer.occlusion[i]) * (1.0 + gradient.dot(&widen(&buffer.direction[i]))).max(0.0);
-        reflectance(mesh.objects[mesh.object_of(simplex)].color).map(|c| (c * arrives) as f32)
+        let light = reflectance(mesh.objects[mesh.object_of(simplex)].color).map(|c| (c * arrives) as f32);
+        (light, buffer.normal[i])
     };
     (0..buffer.len()).into_par_iter().with_min_len(4096).map(light).collect()
 }

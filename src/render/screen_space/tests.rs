@@ -149,7 +149,11 @@ fn directions<const D: usize>(across: usize) {
         let settings = ScreenSpace { thickness: Thickness::Given(f32::INFINITY), ..ScreenSpace::default() };
         let corner = image::<D>(projection, across, settings, |x, _| [2.0, -x.signum(), 0.0]).directed();
         let voxels = corner.ahead.len();
-        let corner = corner.lit(vec![[0.5, 0.25, 0.0]; voxels]);
+        let corner = corner.lit(
+            (0..voxels)
+                .map(|n| ([0.5, 0.25, 0.0], normal(if 2 * (n % across) < across { 1.0 } else { -1.0 }, 0.0)))
+                .collect(),
+        );
         let (middle, mut sum, mut light) = (across / 2, Vector::<D>::zeros(), 0.0);
         let places = (0..16).map(|n| [middle, middle - 2 + n % 4, layer(middle - 2 + n / 4)]);
         for index in places {
@@ -232,7 +236,7 @@ fn arrays<const D: usize>(shading: Shading, across: usize, slab: usize, aovs: &[
 }
 
 /// Where the sky is open and what light comes from other surfaces, against rays: the root mean square of what each is off, and
-/// of what each is.
+/// of what each is. All light here comes from the box's sides, of which the image shows little.
 fn rays_agree_on_light<const D: usize>(across: usize, most: [f64; 2]) {
     let aovs = [Aov::BentNormal, Aov::Bounce, Aov::Irradiance];
     let rays = arrays::<D>(Shading::Voxel(Estimator::Sampled(Sampling::new(128, 1))), across, across, &aovs);
@@ -245,15 +249,15 @@ fn rays_agree_on_light<const D: usize>(across: usize, most: [f64; 2]) {
         let off = rms(&mut rays[a].iter().zip(&space[a]).map(|(a, b)| a - b), rays[a].len());
         let size = rms(&mut rays[a].iter().copied(), rays[a].len());
         println!("{D}D, {name}: {off} of {size}");
-        assert!(off < most && 3.0 * off < size, "{D}D, {name}: {off} of {size}");
+        assert!(off < most && off < 0.7 * size, "{D}D, {name}: {off} of {size}");
     }
     assert_eq!(arrays::<D>(Shading::ScreenSpace(settings), across, 3, &aovs), space, "slabs");
 }
 
 #[test]
 fn screen_space_sees_the_light_that_rays_see() {
-    rays_agree_on_light::<3>(40, [0.02, 0.02]);
-    rays_agree_on_light::<4>(16, [0.02, 0.02]);
+    rays_agree_on_light::<3>(40, [0.01, 0.025]);
+    rays_agree_on_light::<4>(16, [0.02, 0.025]);
 }
 
 fn rays_agree<const D: usize>(across: usize, most: f64) {

@@ -1,9 +1,9 @@
 //! The solid within a closed surface of triangles, in tetrahedra.
 //!
 //! A solid that some point inside sees all of, such as every convex one, is cut into one tetrahedron a triangle by joining
-//! its triangles to that point ([`kernel`]). Any other is cut in two by a plane across an axis, far from all its corners,
-//! and the section is filled with triangles that both halves share ([`complex`], [`section`]); and so on with the halves
-//! ([`cells`]). Cuts go through triangles of the surface too: these are divided, never moved, and its own vertices stay where
+//! its triangles to that point ([`kernel`]). Any other is cut in two by a plane, far from corners, and the section
+//! is filled with triangles that both halves share ([`complex`], [`section`]); and so on with the halves. Of several planes that
+//! is taken whose halves promise the fewest pieces ([`choice`]). Cuts go through triangles of the surface too: these are divided, never moved, and its own vertices stay where
 //! they are.
 //!
 //! Nothing here asks whether four points lie in one plane. The corners of flat faces do but for their last digit, once a body
@@ -16,11 +16,14 @@
 //! triangle on prisms whose flat faces are off by a last digit, most of them slivers), and constrained Delaunay
 //! tetrahedralisation (few pieces, but slivers between corners of a flat face, and no crate with a free licence).
 //!
-//! A surface that is open has no inside and is refused, and so is one of which a section shows that it passes through
-//! itself. Bodies that overlap, each closed, are each filled where no section has both.
+//! A surface that is open has no inside and is refused, and so is one that passes through itself, as bodies that overlap do
+//! ([`crossings`]).
 
+mod apex;
 mod cells;
+mod choice;
 mod complex;
+mod crossings;
 mod kernel;
 mod polygon;
 pub mod section;
@@ -30,8 +33,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Matrix3;
 
+use self::apex::{Apex, apex};
+use self::choice::{MOST_TRIED, best_cut};
 use self::complex::{Complex, Side};
-use self::kernel::{Deepest, Plane, deepest};
 use crate::geometry::Vector64;
 use crate::mesh::facets::sort_with_parity;
 use crate::mesh::topology::{corners, enclosed_volume, facet_pairs};
@@ -78,54 +82,109 @@ pub fn fill(
     if enclosed_volume(corners(&near, &triangles)) < LEAST * LEAST {
         return Err(nothing().into());
     }
-    let (mut complex, whole) = Complex::new(near, &triangles);
-    let own = points.len() as u32;
-    let crossed = |point: Vector64<3>| {
-        let [x, y, z] = frame.outwards(&point).into();
-        format!(
-            "passes through itself, or is too thin for single precision, near ({x:.6}, {y:.6}, {z:.6}); repair it, or \
-             write caps: false for walls only"
-        )
+    if let Some([one, other]) = crossings::crossing(&near, &triangles) {
+        let middle =
+            |i: usize| frame.outwards(&(triangles[i].iter().map(|&p| near[p as usize]).sum::<Vector64<3>>() / 3.0));
+        let place = |i: usize| middle(i).iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ");
+        let how = match one == other {
+            true => format!("the triangle at ({}) is inside a body that the rest of its own is not inside", place(one)),
+            false => format!("the triangles at ({}) and at ({})", place(one), place(other)),
+        };
+        return Err(Unfilled::Refused(format!(
+            "passes through itself, or has bodies that overlap: {how}; unite them in the program that made them, write each as \
+             an object of its own, or write caps: false for walls only"
+        )));
+    }
+    let tries = (MOST_TRIED / triangles.len()).clamp(3, 9);
+    let mut best: Option<((usize, usize), Solid)> = None;
+    let mut trouble = None;
+    // The plain way is fast, and often enough as good.
+    for tries in [0, tries] {
+        match in_cells(&near, &triangles, tries, progress) {
+            Err(Stopped::Cancelled) => return Err(Unfilled::Cancelled),
+            Err(Stopped::At(near)) => trouble = trouble.or(Some(near)),
+            Ok((inner, tetrahedra)) => {
+                let (used, tetrahedra) = super::lattice::compact(tetrahedra);
+                let place = |i: u32| match points.get(i as usize) {
+                    Some(point) => *point,
+                    None => frame.outwards(&inner[i as usize]),
+                };
+                let places: Vec<Vector64<3>> = used.into_iter().map(place).collect();
+                let order = (folded(&places, &tetrahedra), tetrahedra.len());
+                if best.as_ref().is_none_or(|(least, _)| order < *least) {
+                    best = Some((order, (places, tetrahedra)));
+                }
+            }
+        }
+        if best.as_ref().is_some_and(|((folded, count), _)| *folded == 0 && *count <= FEW * triangles.len()) {
+            break;
+        }
+    }
+    match (best, trouble) {
+        (Some((_, (_, tetrahedra))), _) if tetrahedra.is_empty() => Err(nothing().into()),
+        (Some((_, solid)), _) => Ok(solid),
+        (None, near) => {
+            let [x, y, z] = frame.outwards(&near.unwrap_or_default()).into();
+            let message = format!(
+                "passes through itself, or is too thin for single precision, near ({x:.6}, {y:.6}, {z:.6}); repair it, or \
+                 write caps: false for walls only"
+            );
+            Err(message.into())
+        }
+    }
+}
+
+/// Points and tetrahedra.
+type Solid = (Vec<Vector64<3>>, Vec<[u32; 4]>);
+
+/// So many tetrahedra a triangle are few.
+const FEW: usize = 4;
+
+/// How many tetrahedra have no volume left once their corners are rounded to single precision.
+fn folded(points: &[Vector64<3>], tetrahedra: &[[u32; 4]]) -> usize {
+    let rounded = |i: u32| points[i as usize].map(|x| f64::from(x as f32));
+    let volume = |tetrahedron: &&[u32; 4]| {
+        let [a, b, c, d] = tetrahedron.map(rounded);
+        (b - a).cross(&(c - a)).dot(&(d - a))
     };
+    tetrahedra.iter().filter(|tetrahedron| volume(tetrahedron) <= 0.0).count()
+}
+
+/// Why there are no cells.
+enum Stopped {
+    Cancelled,
+    /// A point near which no cut is possible.
+    At(Vector64<3>),
+}
+
+/// The solid in tetrahedra, where so many cuts of a cell are tried; the points' own come first.
+fn in_cells(
+    points: &[Vector64<3>],
+    triangles: &[[u32; 3]],
+    tries: usize,
+    progress: &dyn Progress,
+) -> Result<Solid, Stopped> {
+    let (mut complex, whole) = Complex::new(points.to_vec(), triangles);
+    let own = points.len() as u32;
     let mut leaves: Vec<(Vec<Side>, Apex)> = Vec::new();
     let mut open: Vec<(Vec<Side>, u32)> = vec![(whole, 0)];
     while let Some((cell, cuts)) = open.pop() {
         let cell = complex.resolve(&cell);
         for part in cells::parts(&complex, cell) {
             if progress.cancelled() {
-                return Err(Unfilled::Cancelled);
+                return Err(Stopped::Cancelled);
             }
-            let corners = corners_of(&complex, &part);
+            let corners = complex.corners_of(&part);
             if let Some(apex) = apex(&complex, &part, &corners, own, cuts) {
                 leaves.push((part, apex));
                 continue;
             }
-            let mut trouble = complex.points[corners[0] as usize];
-            let mut halves = None;
-            for cut in cells::cuts(&complex, &part, &corners, 2.0 * LEAST) {
-                match complex.cut(&part, cut.axis, cut.at) {
-                    Ok(found) => {
-                        halves = Some(found);
-                        break;
-                    }
-                    Err(near) => trouble = near,
-                }
-            }
-            let Some([below, above]) = halves else { return Err(crossed(trouble).into()) };
-            open.push((above, cuts + 1));
-            open.push((below, cuts + 1));
+            let halves = best_cut(&mut complex, &part, &corners, own, cuts, tries, progress).map_err(Stopped::At)?;
+            open.extend(halves.into_iter().rev().map(|cell| (cell, cuts + 1)));
         }
     }
-    let tetrahedra = tetrahedra(&mut complex, leaves).map_err(crossed)?;
-    if tetrahedra.is_empty() {
-        return Err(nothing().into());
-    }
-    let (used, tetrahedra) = super::lattice::compact(tetrahedra);
-    let points = used.into_iter().map(|i| match points.get(i as usize) {
-        Some(point) => *point,
-        None => frame.outwards(&complex.points[i as usize]),
-    });
-    Ok((points.collect(), tetrahedra))
+    let tetrahedra = tetrahedra(&mut complex, leaves);
+    Ok((complex.points, tetrahedra))
 }
 
 /// The triangles without those that lie on each other and face opposite ways, as where two bodies touch.
@@ -212,76 +271,8 @@ fn outward(points: &[Vector64<3>], triangles: Vec<[u32; 3]>) -> Result<Vec<[u32;
     Ok(triangles)
 }
 
-fn corners_of(complex: &Complex, cell: &[Side]) -> Vec<u32> {
-    let mut corners: Vec<u32> = cell.iter().flat_map(|&(face, _)| complex.corners(face)).collect();
-    corners.sort_unstable();
-    corners.dedup();
-    corners
-}
-
-/// What a cell's faces are joined to.
-enum Apex {
-    /// A point inside.
-    Inside(Vector64<3>),
-    /// A corner, which sees all faces that it is not part of.
-    Corner(u32),
-}
-
-/// A point that sees all of a cell from well above each face; none if the cell is better cut first.
-fn apex(complex: &Complex, cell: &[Side], corners: &[u32], own: u32, cuts: u32) -> Option<Apex> {
-    let planes: Vec<Plane> =
-        cell.iter().map(|&side| complex.plane(side)).filter(|plane| plane.normal.amax() > 0.0).collect();
-    let points = || corners.iter().map(|&i| complex.points[i as usize]);
-    let low = points().fold(Vector64::repeat(f64::INFINITY), |low: Vector64<3>, p| low.inf(&p));
-    let high = points().fold(Vector64::repeat(f64::NEG_INFINITY), |high: Vector64<3>, p| high.sup(&p));
-    let (center, radius) = ((low + high) / 2.0, (high - low).norm() / 2.0);
-    // What is thin has no deep point. The wider a cell is than its kernel is deep, the more a cut may better it; after many
-    // cuts it is as good as it gets.
-    let share = 0.05 * 0.5f64.powi(cuts.saturating_sub(30).min(60) as i32);
-    if let Some(Deepest { point, depth, limits }) = deepest(&planes, &center, radius, LEAST) {
-        let width = |n: &Vector64<3>| {
-            let heights = points().map(|p| n.dot(&p));
-            let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-            high - low
-        };
-        let width = limits.iter().map(width).fold(f64::INFINITY, f64::min);
-        if depth >= share * width && covers(complex, cell, &point) == 1 {
-            return Some(Apex::Inside(point));
-        }
-    }
-    if cell.len() > 60 {
-        return None;
-    }
-    let sees = |&corner: &u32| {
-        let point = complex.points[corner as usize];
-        let height = |&side: &Side| match complex.corners(side.0).contains(&corner) {
-            true => f64::INFINITY,
-            false => complex.plane(side).offset - complex.plane(side).normal.dot(&point),
-        };
-        cell.iter().map(height).fold(f64::INFINITY, f64::min) >= (share * radius).max(LEAST)
-    };
-    corners.iter().copied().filter(|&corner| corner < own).find(sees).map(Apex::Corner)
-}
-
-/// How often a cell's boundary, all of which faces away from a point, lies around it: more than once if it passes through
-/// itself. Its solid angle, by the formula of Van Oosterom and Strackee (1983).
-fn covers(complex: &Complex, cell: &[Side], from: &Vector64<3>) -> i64 {
-    let mut angle = 0.0;
-    for &side in cell {
-        let corners = complex.corners_outward(side);
-        let at = |i: usize| complex.points[corners[i] as usize] - from;
-        for i in 1..corners.len() - 1 {
-            let [a, b, c] = [at(0), at(i), at(i + 1)];
-            let [x, y, z] = [a.norm(), b.norm(), c.norm()];
-            let cosine = x * y * z + a.dot(&b) * z + b.dot(&c) * x + c.dot(&a) * y;
-            angle += 2.0 * libm::atan2(a.cross(&b).dot(&c), cosine);
-        }
-    }
-    (angle / (4.0 * std::f64::consts::PI)).round() as i64
-}
-
 /// Joins the faces of each cell to its apex.
-fn tetrahedra(complex: &mut Complex, leaves: Vec<(Vec<Side>, Apex)>) -> Result<Vec<[u32; 4]>, Vector64<3>> {
+fn tetrahedra(complex: &mut Complex, leaves: Vec<(Vec<Side>, Apex)>) -> Vec<[u32; 4]> {
     let mut cut: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
     let mut found = Vec::new();
     for (cell, apex) in leaves {
@@ -307,5 +298,5 @@ fn tetrahedra(complex: &mut Complex, leaves: Vec<(Vec<Side>, Apex)>) -> Result<V
             }
         }
     }
-    Ok(found)
+    found
 }

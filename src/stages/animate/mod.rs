@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -30,6 +31,7 @@ use super::{Invalid, Keys, LeftOut, Needs, OneOrMany, Output, Plan, Ref, Resolve
 use super::{names, suggest};
 use crate::io::{self, AtomicFile, pvd};
 use crate::occlusion::Cancelled;
+use crate::progress::Progress;
 use crate::render::{Aov, Skylight};
 use crate::text::number;
 
@@ -37,6 +39,8 @@ pub use path::{Motion, MoveSpec, PathPlan, TurnSpec};
 
 /// The most frames: their numbers have four digits.
 const MOST: u64 = 10_000;
+/// The most frames that are made at once.
+const MOST_AT_ONCE: usize = 4;
 /// Frames a second where nothing else is said.
 const RATE: f64 = 24.0;
 /// Said where it lacks a render.
@@ -296,7 +300,11 @@ impl Stage for AnimatePlan {
         }
         let aovs: BTreeSet<Aov> = animation.arrays.iter().copied().collect();
         let frame = render.voxels().saturating_mul(Format::Vti.disk_bytes(&write, write::Image::of(plan, render)));
-        Needs { disk: frame.saturating_mul(frames), ..render.memory(plan, &aovs) }
+        let needs = render.memory(plan, &aovs);
+        let alone = render.screen_space.is_some() || matches!(animation.moves, Moves::Objects(_));
+        let at_once = if alone { 1 } else { frames.min(MOST_AT_ONCE as u64) };
+        let memory = needs.memory.saturating_mul(at_once);
+        Needs { memory, disk: frame.saturating_mul(frames), ..needs }
     }
 
     fn line(me: Ref<Self>, plan: &Plan, _: &[Counts]) -> String {
@@ -351,17 +359,20 @@ impl Stage for AnimatePlan {
                         occlusion::values(occlusion, run, scene)?;
                     }
                     let mut light = None;
-                    for &i in &stale {
-                        let render = animation.render(i, plan);
-                        // The light of other surfaces is another where the scene turns below its sky.
-                        let sky = render.lighting.as_ref().and_then(|lighting| lighting.sky.clone());
-                        let skylight = match light.take() {
-                            Some((known, skylight)) if known == sky => skylight,
-                            _ => scene.skylight(render.occlusion, render.light_asked(&animation.arrays), run)?,
-                        };
-                        light = Some((sky, skylight.clone()));
-                        let picture = frame(me, i, &render, run, scene, skylight)?;
-                        made.add(picture, &format!("animate {}", plan.id(me)), run)?;
+                    for together in stale.chunks(at_once(&plan[animation.render], scene)) {
+                        let mut asked = Vec::new();
+                        for &i in together {
+                            let render = animation.render(i, plan);
+                            // The light of other surfaces is another where the scene turns below its sky.
+                            let sky = render.lighting.as_ref().and_then(|lighting| lighting.sky.clone());
+                            let skylight = match light.take() {
+                                Some((known, skylight)) if known == sky => skylight,
+                                _ => scene.skylight(render.occlusion, render.light_asked(&animation.arrays), run)?,
+                            };
+                            light = Some((sky, skylight.clone()));
+                            asked.push((i, render, skylight));
+                        }
+                        frames(me, asked, run, scene, &mut made)?;
                     }
                 }
             }
@@ -404,7 +415,6 @@ impl Sum {
     fn add(&mut self, picture: Picture, name: &str, run: &mut Run) -> Result<(), StageError> {
         self.voxels += picture.voxels;
         run.work.voxels += picture.voxels;
-        self.rendering += picture.rendering;
         let mut notes = Vec::new();
         if let Some(why) = picture.nothing {
             notes.push(format!("{name}: some frames show background only: {why}"));
@@ -427,21 +437,64 @@ impl Sum {
     }
 }
 
-/// Makes one frame.
-fn frame<const D: usize>(
+/// How many frames are made at once: as many as there are threads, since parts of a picture are made by one alone; but one where
+/// it takes much memory, or a device is asked, which does one thing at a time.
+fn at_once<const D: usize>(render: &RenderPlan, scene: &SceneRun<D>) -> usize {
+    let alone = render.screen_space.is_some() || scene.session.is_on_opencl();
+    if alone { 1 } else { rayon::current_num_threads().clamp(1, MOST_AT_ONCE) }
+}
+
+/// Makes some frames at once, each given with its render and its light.
+fn frames<const D: usize>(
     me: Ref<AnimatePlan>,
-    i: usize,
-    render: &RenderPlan,
-    run: &Run,
+    asked: Vec<(usize, RenderPlan, Option<Arc<Skylight<D>>>)>,
+    run: &mut Run,
     scene: &SceneRun<D>,
-    skylight: Option<Arc<Skylight<D>>>,
-) -> Result<Picture, StageError> {
+    made: &mut Sum,
+) -> Result<(), StageError> {
     let (plan, animation) = (run.plan, &run.plan[me]);
-    let name = format!("animate {}, frame {} of {}", plan.id(me), i + 1, animation.files.len());
-    let write = animation.write();
-    render.picture((&name, None), plan, scene, skylight, run.progress, |grid, hash| {
-        PictureFiles::frame(&animation.files[i], &write, render, plan, run.told, grid, hash)
-    })
+    let [first, last] = [asked.first(), asked.last()].map(|frame| frame.map_or(0, |frame| frame.0 + 1));
+    let count = animation.files.len();
+    let which = if first == last { format!("frame {first}") } else { format!("frames {first} to {last}") };
+    let name = format!("animate {}, {which} of {count}", plan.id(me));
+    let voxels: u64 = asked.iter().map(|(_, render, _)| 2 * render.voxels()).sum();
+    let running = run.progress.stage(&name, voxels);
+    let (write, within, told) = (animation.write(), Within(run.progress), run.told);
+    let scene = &scene;
+    let picture = |(i, render, skylight): (usize, RenderPlan, Option<Arc<Skylight<D>>>)| {
+        render.picture((&name, None), plan, scene, skylight, &within, |grid, hash| {
+            PictureFiles::frame(&animation.files[i], &write, &render, plan, told, grid, hash)
+        })
+    };
+    let pictures: Vec<Result<Picture, StageError>> = asked.into_par_iter().with_max_len(1).map(picture).collect();
+    made.rendering += running.end();
+    let name = format!("animate {}", plan.id(me));
+    // Those that are whole are remembered, also where another failed.
+    let mut failed = None;
+    for picture in pictures {
+        match picture {
+            Ok(picture) => made.add(picture, &name, run)?,
+            Err(error) => failed = failed.or(Some(error)),
+        }
+    }
+    failed.map_or(Ok(()), Err)
+}
+
+/// Counts the steps of frames that are made at once as those of the stage that is running.
+struct Within<'p>(&'p dyn Progress);
+
+impl Progress for Within<'_> {
+    fn begin(&self, _stage: &str, _total: u64) {}
+
+    fn advance(&self, steps: u64) {
+        self.0.advance(steps);
+    }
+
+    fn end(&self) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
 }
 
 /// Makes frames in which these objects move among others: each has a scene of its own.
@@ -478,8 +531,7 @@ fn move_objects<const D: usize>(
             moved.values.insert(occlusion, Arc::new(found));
         }
         let skylight = moved.skylight(render.occlusion, render.light_asked(&animation.arrays), run)?;
-        let picture = frame(me, i, render, run, &moved, skylight)?;
-        made.add(picture, &format!("animate {}", plan.id(me)), run)?;
+        frames(me, vec![(i, render.clone(), skylight)], run, &moved, made)?;
     }
     Ok(())
 }

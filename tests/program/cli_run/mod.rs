@@ -1,6 +1,7 @@
 //! `ao4d run` as its users see it: which files appear, what a second run does, what goes wrong and how that is told.
 
 mod caching;
+mod compose;
 mod faults;
 mod frames;
 mod input;

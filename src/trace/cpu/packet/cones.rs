@@ -121,40 +121,6 @@ impl<const D: usize> Cones<D> {
         value
     }
 
-    /// Lanes that may hold a direction at all.
-    #[inline(always)]
-    pub fn live<L: Lanes>(&self) -> u8 {
-        !L::load(&self.bounds[0]).negative()
-    }
-
-    /// One of the cones against eight directions, given as rows of their components: those that are surely inside, and
-    /// those that may be.
-    #[inline(always)]
-    pub fn judge_eight<L: Lanes>(&self, lane: usize, directions: &[L; D]) -> [u8; 2] {
-        let mut least = L::splat(f32::INFINITY);
-        let mut greatest = L::splat(f32::NEG_INFINITY);
-        let mut most = 0.0f32;
-        for i in 0..D {
-            let bound = self.bounds[i][lane % WIDTH];
-            most = most.max(bound);
-            let mut value = L::splat(bound);
-            for k in 0..D {
-                value = L::splat(self.normals[i][k][lane % WIDTH]).mul_add(directions[k], value);
-            }
-            least = least.min(value);
-            greatest = greatest.max(value);
-        }
-        let most = L::splat(2.01 * most);
-        if self.trusted >> lane & 1 == 1 {
-            let outside = least.negative();
-            let inside = !least.less_or_equal(most);
-            [inside & !outside, !outside & !inside]
-        } else {
-            // Turned inwards or outwards.
-            [0, !least.negative() | greatest.less_or_equal(most)]
-        }
-    }
-
     /// The cones that may hold the direction. It is the same in all lanes, and no component exceeds 1 by more than
     /// rounding.
     #[inline(always)]
@@ -188,27 +154,6 @@ impl<const D: usize> Cones<D> {
     }
 }
 
-/// Whether the cones of these vectors hold a direction, the same in all lanes; for one direction this is less work than
-/// making [`Cones`]. `size` is a bound on the 1-norms of the vectors. Cones with a zero vector may be doubtful.
-#[inline(always)]
-pub(super) fn judge_once<L: Lanes, const D: usize>(edges: &[[L; D]; D], direction: &[L; D], size: f32) -> Verdict {
-    let normals = facet_normals(edges);
-    let determinant = dot(&normals[0], &edges[0]);
-    let value = dot(&normals[0], direction).turned_by(determinant);
-    let (mut least, mut greatest) = (value, value);
-    for normal in &normals[1..] {
-        let value = dot(normal, direction).turned_by(determinant);
-        least = least.min(value);
-        greatest = greatest.max(value);
-    }
-    let bound = ROUNDING * Dimension::of::<D>().pick(size * size, size * size * size) + UNDERFLOW;
-    let unoriented = determinant.abs().less_or_equal(L::splat(bound * size + UNDERFLOW));
-    let outside = least.less_or_equal(L::splat(-bound));
-    let inside = !least.less_or_equal(L::splat(bound)) & !unoriented;
-    let turned_inside = unoriented & greatest.less_or_equal(L::splat(bound));
-    Verdict { inside, doubtful: (!outside | turned_inside) & !inside }
-}
-
 #[inline(always)]
 pub(super) fn dot<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> L {
     let mut sum = a[0].mul(b[0]);
@@ -220,13 +165,13 @@ pub(super) fn dot<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> L {
 
 /// a d - b c
 #[inline(always)]
-fn minor<L: Lanes>(a: L, b: L, c: L, d: L) -> L {
+pub(super) fn minor<L: Lanes>(a: L, b: L, c: L, d: L) -> L {
     a.mul_sub(d, b.mul(c))
 }
 
 /// The minors of rows (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3).
 #[inline(always)]
-fn minors<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> [L; 6] {
+pub(super) fn minors<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> [L; 6] {
     let mut minors = [a[0]; 6];
     for (m, (p, q)) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].into_iter().enumerate() {
         minors[m] = minor(a[p], a[q], b[p], b[q]);
@@ -236,7 +181,7 @@ fn minors<L: Lanes, const D: usize>(a: &[L; D], b: &[L; D]) -> [L; 6] {
 
 /// a_0 m_0 - a_1 m_1 + a_2 m_2
 #[inline(always)]
-fn triple<L: Lanes>(a: [L; 3], m: [L; 3]) -> L {
+pub(super) fn triple<L: Lanes>(a: [L; 3], m: [L; 3]) -> L {
     a[2].mul_add(m[2], a[0].mul_sub(m[0], a[1].mul(m[1])))
 }
 

@@ -1,9 +1,8 @@
 //! The rays of one shading point, 64 at a time.
 //!
 //! These are the directions of [`Sequence::next_direction`], bit for bit: the same operations in the same order, without
-//! branches, so that the compiler works on several directions at once. Their order within a block differs, which a count
-//! does not notice. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
-//! taken in ascending order, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
+//! branches, so that the compiler works on several directions at once. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
+//! taken in ascending order, which a count does not notice, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
 
 use super::lanes::Lanes;
 use crate::accel::WIDTH;
@@ -12,17 +11,6 @@ use crate::trace::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, 
 
 /// Rays of a block; the bits of a `u64` name them.
 pub(super) const BLOCK: usize = 64;
-
-/// Groups of rays as wide as the lanes.
-pub(super) const GROUPS: usize = BLOCK / WIDTH;
-
-/// A cone that holds the directions of a group: its axis, and the cosine and sine of its half-angle, at most a right angle.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct GroupCone<const D: usize> {
-    pub axis: [f32; D],
-    pub cosine: f32,
-    pub sine: f32,
-}
 
 /// The first Sobol' points, each coordinate with its bits reversed.
 static SOBOL_BLOCK: [[u32; BLOCK]; 3] = sobol_block();
@@ -47,20 +35,13 @@ const fn sobol_block() -> [[u32; BLOCK]; 3] {
 pub(super) struct Rays<const D: usize> {
     /// Directions in the coordinates of the scene, as [`crate::geometry::Ray`] keeps them.
     pub direction: [[f32; BLOCK]; D],
-    /// One over each component, which is taken for 1e-12 if it is smaller: over the extent of a scene that moves a ray
-    /// by less than boxes are grown by.
+    /// One over each component; 0 is taken for 1e-30: over the extent of a scene that moves a ray by less than boxes are grown
+    /// by.
     pub inverse: [[f32; BLOCK]; D],
     /// The size of `inverse`.
     pub absolute: [[f32; BLOCK]; D],
-    /// The origin, in the coordinates of the boxes, times `inverse`.
-    pub offset: [[f32; BLOCK]; D],
     /// The cosine to the normal.
     pub height: [f32; BLOCK],
-    /// The place of each ray in the sequence, counted from the block's first: of Sobol' points of a whole block, in the
-    /// order of their indices, which keeps aligned runs of 2^k rays together.
-    pub number: [u8; BLOCK],
-    /// Around the directions of each group.
-    pub cones: [GroupCone<D>; GROUPS],
 }
 
 impl<const D: usize> Rays<D> {
@@ -69,10 +50,7 @@ impl<const D: usize> Rays<D> {
             direction: [[0.0; BLOCK]; D],
             inverse: [[0.0; BLOCK]; D],
             absolute: [[0.0; BLOCK]; D],
-            offset: [[0.0; BLOCK]; D],
             height: [0.0; BLOCK],
-            number: [0; BLOCK],
-            cones: [GroupCone { axis: [0.0; D], cosine: 0.0, sine: 1.0 }; GROUPS],
         }
     }
 
@@ -113,7 +91,6 @@ impl<const D: usize> Rays<D> {
                 sequence.next = sequence.next.wrapping_add(count as u32);
             }
         }
-        let points = in_order::<D>(&points, count, &mut self.number);
         self.lift(&points, frame);
     }
 
@@ -148,46 +125,37 @@ impl<const D: usize> Rays<D> {
         }
     }
 
-    /// Uses these directions, none longer than 1: bounds on rounding and the cones around groups rely on that.
-    pub fn set(&mut self, directions: &[Vector<D>]) {
+    /// Uses these directions, none longer than 1: bounds on rounding rely on that. Heights are over the hyperplane of this
+    /// normal.
+    pub fn set(&mut self, directions: &[Vector<D>], normal: &Vector<D>) {
         debug_assert!(directions.iter().all(|d| d.norm_squared() < 1.0 + 1e-5));
         for (i, direction) in directions.iter().enumerate().take(BLOCK) {
             (0..D).for_each(|k| self.direction[k][i] = direction[k]);
-            self.height[i] = 0.0;
-            self.number[i] = i as u8;
+            self.height[i] = direction.dot(normal);
         }
-    }
-
-    /// The bits of a set of rays by their place in the sequence.
-    pub fn in_sequence(&self, set: u64) -> u64 {
-        (0..BLOCK).fold(0, |word, i| word | (set >> i & 1) << (self.number[i] % BLOCK as u8))
     }
 
     /// Tells the first `count` rays, in the sequence's order, to `watch`: where each goes, and whether it is in the set.
     pub fn tell(&self, set: u64, count: usize, watch: &mut dyn FnMut(Vector<D>, bool)) {
-        let mut places = [0; BLOCK];
-        (0..count).for_each(|i| places[self.number[i] as usize % BLOCK] = i);
-        for &i in &places[..count] {
+        for i in 0..count {
             watch(Vector::from_fn(|k, _| self.direction[k][i]), set >> i & 1 == 1);
         }
     }
 
-    /// Completes the directions by what box tests need. `origin` is in the coordinates of the boxes.
+    /// Completes the directions by what box tests need.
     #[inline(always)]
-    pub fn start_from(&mut self, origin: &Vector<D>) {
+    pub fn complete(&mut self) {
         for k in 0..D {
             for i in 0..BLOCK {
                 let x = self.direction[k][i];
                 let x = if x.abs() < 1e-30 { 0.0 } else { x };
-                let size = if x.abs() > 1e-12 { x.abs() } else { 1e-12 };
+                let size = if x.abs() > 1e-30 { x.abs() } else { 1e-30 };
                 let inverse = 1.0 / size.copysign(x);
                 self.direction[k][i] = x;
                 self.inverse[k][i] = inverse;
                 self.absolute[k][i] = inverse.abs();
-                self.offset[k][i] = origin[k] * inverse;
             }
         }
-        self.enclose();
     }
 
     /// The rays whose cosine to the normal is at most this.
@@ -200,51 +168,15 @@ impl<const D: usize> Rays<D> {
         mask
     }
 
-    /// Finds the cones around the directions of the groups. Directions beyond `count` are left from before, and may be
-    /// zero; they only make a cone wider than it need be.
+    /// The axis that a ray mostly follows.
     #[inline(always)]
-    fn enclose(&mut self) {
-        for group in 0..GROUPS {
-            let mut axis = [0.0f32; D];
-            let mut square = 0.0f32;
-            for k in 0..D {
-                for x in &self.direction[k].as_chunks::<WIDTH>().0[group] {
-                    axis[k] += x;
-                }
-                square += axis[k] * axis[k];
-            }
-            let factor = 1.0 / square.max(1e-10).sqrt();
-            let mut along = [0.0f32; WIDTH];
-            for k in 0..D {
-                axis[k] *= factor;
-                let row = &self.direction[k].as_chunks::<WIDTH>().0[group];
-                for i in 0..WIDTH {
-                    along[i] += axis[k] * row[i];
-                }
-            }
-            let mut cosine = 1.0f32;
-            for x in along {
-                cosine = if x < cosine { x } else { cosine };
-            }
-            // Rounding of products of unit vectors, and more. A cone wider than a half-space is all of space.
-            let cosine = cosine - 1e-5;
-            let sine = (1.0 - cosine * cosine).max(0.0).sqrt() + 1e-5;
-            self.cones[group] = if cosine > 0.0 {
-                GroupCone { axis, cosine, sine }
-            } else {
-                GroupCone { axis: [0.0; D], cosine: -1.0, sine: 1.0 }
-            };
+    pub fn main_axis(&self, i: usize) -> usize {
+        let (mut axis, mut size) = (0, self.absolute[0][i]);
+        for k in 1..D {
+            let x = self.absolute[k][i];
+            (axis, size) = if x < size { (k, x) } else { (axis, size) };
         }
-    }
-
-    /// The directions of a group.
-    #[inline(always)]
-    pub fn directions<L: Lanes>(&self, group: usize) -> [L; D] {
-        let mut directions = [L::splat(0.0); D];
-        for k in 0..D {
-            directions[k] = L::load(&self.direction[k].as_chunks().0[group]);
-        }
-        directions
+        axis
     }
 
     /// The direction of a ray, in all lanes.
@@ -256,49 +188,6 @@ impl<const D: usize> Rays<D> {
         }
         direction
     }
-}
-
-/// The points cell by cell of a grid of 64 cells along Morton's curve, so that neighbours in a block go to the same
-/// parts of the scene.
-#[inline(always)]
-fn in_order<const D: usize>(points: &[[f32; BLOCK]; 3], count: usize, number: &mut [u8; BLOCK]) -> [[f32; BLOCK]; 3] {
-    // Bits of the cells along an axis, spread apart to be joined.
-    const SPREAD_2: [u8; 8] = [0, 1, 4, 5, 16, 17, 20, 21];
-    const SPREAD_3: [u8; 4] = [0, 1, 8, 9];
-    let cell = |x: f32, cells: f32| ((x + 1.0) * (cells * 0.5)) as i32 as usize;
-    let mut keys = [0u8; BLOCK];
-    for i in 0..BLOCK {
-        keys[i] = match Dimension::of::<D>() {
-            Dimension::Three => {
-                let spread = |x: f32| SPREAD_2[cell(x, 8.0) % 8];
-                spread(points[0][i]) | spread(points[1][i]) << 1
-            }
-            Dimension::Four => {
-                let spread = |x: f32| SPREAD_3[cell(x, 4.0) % 4];
-                spread(points[0][i]) | spread(points[1][i]) << 1 | spread(points[2][i]) << 2
-            }
-        };
-    }
-    let mut ends = [0u8; BLOCK];
-    for &key in &keys[..count] {
-        ends[key as usize % BLOCK] += 1;
-    }
-    let mut sum = 0;
-    for end in &mut ends {
-        sum += *end;
-        *end = sum;
-    }
-    let mut ordered = [[0.0; BLOCK]; 3];
-    for (i, &key) in keys[..count].iter().enumerate() {
-        let end = &mut ends[key as usize % BLOCK];
-        *end -= 1;
-        let place = *end as usize % BLOCK;
-        number[place] = i as u8;
-        for d in 0..D - 1 {
-            ordered[d][place] = points[d][i];
-        }
-    }
-    ordered
 }
 
 /// As [`Sequence::next_point`] makes a coordinate of bits; 24 of them fit a signed number.
@@ -356,7 +245,7 @@ mod tests {
                 let expected = (0..count).map(|_| Ray::new(Vector::zeros(), slow.next_direction(&frame)).direction);
                 let mut expected: Vec<_> = expected.map(|d| key(&d)).collect();
                 rays.take(&mut fast, &frame, count);
-                rays.start_from(&Vector::zeros());
+                rays.complete();
                 let mut found: Vec<_> =
                     (0..count).map(|i| key(&Vector::from_fn(|k, _| rays.direction[k][i]))).collect();
                 expected.sort();

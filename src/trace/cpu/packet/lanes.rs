@@ -10,15 +10,22 @@ use crate::accel::WIDTH;
 /// One row of lanes in memory: a number for each simplex of a leaf, or for each child of a node.
 pub(super) type Row = [f32; WIDTH];
 
+/// The bits of 32 rays, for each of eight boxes those that meet it.
+pub(super) type Words = [u32; WIDTH];
+
 /// Eight numbers. Code that is generic over them must be inlined into the function compiled for the level, so it uses plain
 /// loops: a closure handed to an iterator is compiled apart, without the level's instructions. A mask has the bit of each lane, lane 0 lowest.
 pub(super) trait Lanes: Copy {
+    /// Eight words side by side.
+    type Marks: Copy;
     fn load(row: &Row) -> Self;
     fn store(self, row: &mut Row);
     fn splat(x: f32) -> Self;
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    fn square_root(self) -> Self;
     /// `self * factor + term`, rounded once or twice.
     fn mul_add(self, factor: Self, term: Self) -> Self;
     /// `self * factor - term`, rounded once or twice.
@@ -28,7 +35,6 @@ pub(super) trait Lanes: Copy {
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
-    fn square_root(self) -> Self;
     /// Each lane with its sign turned where `sign` is negative.
     fn turned_by(self, sign: Self) -> Self;
     /// The lanes of `negative` where the sign bit of `self` is set, of `other` where it isn't.
@@ -36,12 +42,19 @@ pub(super) trait Lanes: Copy {
     /// Lanes with the sign bit set.
     fn negative(self) -> u8;
     fn less_or_equal(self, other: Self) -> u8;
-    /// Writes those of the eight words that the mask names, each with `tag` in its low bits, side by side to the front
-    /// of `out`; what follows them there is overwritten too. Returns how many.
-    fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize;
-    /// Starts to bring an item into the cache.
+    /// No bit in any word.
+    fn unmarked() -> Self::Marks;
+    /// Adds the bits of `bit` to the words where `self` is less than or equal to `other`.
+    fn mark(self, other: Self, bit: u32, marks: Self::Marks) -> Self::Marks;
+    fn words(marks: Self::Marks) -> Words;
+    /// The words in which some bit of either is set.
+    fn any_marked(marks: [Self::Marks; 2]) -> u8;
+    /// Writes those of the eight words that the mask names side by side to the front of `out`; what follows them there is
+    /// overwritten too.
+    fn compress(words: &Words, mask: u8, out: &mut Words);
+    /// Starts to bring a node, or as much of a leaf, into the cache.
     #[inline(always)]
-    fn fetch<T>(_items: &[T], _index: u32) {}
+    fn fetch<const D: usize>(_rows: &[crate::accel::Row], _place: usize) {}
 }
 
 /// Plain arrays.
@@ -56,6 +69,8 @@ impl Portable {
 }
 
 impl Lanes for Portable {
+    type Marks = Words;
+
     #[inline(always)]
     fn load(row: &Row) -> Self {
         Self(*row)
@@ -84,6 +99,16 @@ impl Lanes for Portable {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         self.zip(other, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn square_root(self) -> Self {
+        Self(self.0.map(f32::sqrt))
     }
 
     #[inline(always)]
@@ -118,11 +143,6 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn square_root(self) -> Self {
-        Self(self.0.map(f32::sqrt))
-    }
-
-    #[inline(always)]
     fn turned_by(self, sign: Self) -> Self {
         self.zip(sign, |a, s| f32::from_bits(a.to_bits() ^ (s.to_bits() & (1 << 31))))
     }
@@ -143,14 +163,33 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize {
+    fn unmarked() -> Words {
+        [0; WIDTH]
+    }
+
+    #[inline(always)]
+    fn mark(self, other: Self, bit: u32, marks: Words) -> Words {
+        std::array::from_fn(|i| marks[i] | if self.0[i] <= other.0[i] { bit } else { 0 })
+    }
+
+    #[inline(always)]
+    fn words(marks: Words) -> Words {
+        marks
+    }
+
+    #[inline(always)]
+    fn any_marked([one, other]: [Words; 2]) -> u8 {
+        (0..WIDTH).fold(0, |mask, i| mask | (u8::from(one[i] | other[i] != 0) << i))
+    }
+
+    #[inline(always)]
+    fn compress(words: &Words, mask: u8, out: &mut Words) {
         let mut count = 0;
         let mut rest = mask;
         while rest != 0 {
-            out[count] = words[rest.trailing_zeros() as usize] | tag;
+            out[count] = words[rest.trailing_zeros() as usize];
             rest &= rest - 1;
             count += 1;
         }
-        count
     }
 }

@@ -9,7 +9,9 @@
 //! - [`directions`]: the rays of a shading point, 64 at a time;
 //! - [`star`]: what the simplices around a vertex hide;
 //! - [`traverse`]: the rays through the [`crate::accel::WideBvh`];
-//! - [`leaves`]: the rays against the simplices of a leaf;
+//! - [`leaves`]: sets of rays against the simplices of a leaf, and what is left in doubt;
+//! - [`view`]: how a leaf lies to the origin;
+//! - [`single`]: one ray against the simplices of a leaf;
 //! - [`cones`]: eight simplices as cones seen from the shading point;
 //! - [`tracer`]: all of this, point after point.
 
@@ -19,9 +21,11 @@ mod lanes;
 mod leaves;
 mod level;
 mod query;
+mod single;
 mod star;
 mod tracer;
 mod traverse;
+mod view;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

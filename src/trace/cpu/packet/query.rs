@@ -1,31 +1,53 @@
 //! What is asked: which rays from a point hit a mesh.
 
 use super::directions::{BLOCK, Rays};
-use crate::accel::{Tracer, WideBvh};
+use crate::accel::{Leaf, Row, Tracer, WideBvh};
 use crate::geometry::{Ray, Vector};
 
 /// One shading point among the simplices of a mesh.
 pub(super) struct Query<'t, const D: usize> {
     pub tracer: &'t Tracer<D>,
     pub wide: &'t WideBvh<D>,
+    /// The nodes and leaves.
+    pub rows: &'t [Row],
     pub position: Vector<D>,
-    /// The position in the coordinates of the leaves.
+    /// The position in the coordinates of the boxes and leaves.
     pub scaled: Vector<D>,
-    /// The position in the coordinates of the boxes.
-    pub centred: Vector<D>,
     /// All rays surely go to this side, if it isn't zero.
     pub normal: Vector<D>,
+    /// How much they rise to that side at least, as a share of their length.
+    pub rise: f32,
     /// Hits beyond it don't count.
     pub limit: f32,
     /// The simplices that rays don't hit.
     pub ignored: &'t [u32],
+    /// Those that have a corner where the rays start, ascending; none unless that is a vertex. They are never hit, and left out
+    /// before that is asked.
+    pub around: &'t [u32],
 }
 
 impl<'t, const D: usize> Query<'t, D> {
-    pub fn new(tracer: &'t Tracer<D>, position: Vector<D>, normal: Vector<D>, limit: f32, ignored: &'t [u32]) -> Self {
+    pub fn new(
+        tracer: &'t Tracer<D>,
+        position: Vector<D>,
+        (normal, rise): (Vector<D>, f32),
+        limit: f32,
+        [ignored, around]: [&'t [u32]; 2],
+    ) -> Self {
         let wide = tracer.wide();
-        let (scaled, centred) = (wide.scale.scaled(&position), wide.scale.centred(&position));
-        Self { tracer, wide, position, scaled, centred, normal, limit, ignored }
+        let rows = wide.rows();
+        Self {
+            tracer,
+            wide,
+            rows,
+            position,
+            scaled: wide.scale.scaled(&position),
+            normal,
+            rise,
+            limit,
+            ignored,
+            around,
+        }
     }
 
     /// A ray of a block, for exact arithmetic.
@@ -42,6 +64,31 @@ impl<'t, const D: usize> Query<'t, D> {
             far.any(&ray, limit, |simplex| !ignored.contains(&simplex) && tracer.hits(simplex, &ray, limit))
         };
         (0..BLOCK).filter(|i| alive >> i & 1 == 1).filter(hits).fold(0, |found, i| found | 1 << i)
+    }
+
+    /// The lanes of a leaf with simplices that are to be ignored.
+    #[inline(never)]
+    pub fn ignored_lanes(&self, leaf: &Leaf<D>) -> u8 {
+        self.lanes(leaf, |simplex| self.ignored.contains(&simplex))
+    }
+
+    /// The lanes of a leaf with simplices that have a corner at the vertex that rays start from.
+    #[inline(never)]
+    pub fn around_lanes(&self, leaf: &Leaf<D>) -> u8 {
+        self.lanes(leaf, |simplex| self.around.binary_search(&simplex).is_ok())
+    }
+
+    /// The lanes for which this holds, unused ones as the last.
+    fn lanes(&self, leaf: &Leaf<D>, holds: impl Fn(u32) -> bool) -> u8 {
+        let simplices = &self.wide.order[leaf.range()];
+        let mut lanes = 0;
+        for (lane, &simplex) in simplices.iter().enumerate() {
+            if holds(simplex) {
+                let last = lane + 1 == simplices.len();
+                lanes |= if last { u8::MAX << lane } else { 1 << lane };
+            }
+        }
+        lanes
     }
 
     /// The limit in the coordinates of the boxes, and a little more.

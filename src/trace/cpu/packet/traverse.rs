@@ -1,137 +1,123 @@
 //! The rays of a block through the hierarchy.
 //!
-//! They start as one set and descend together as long as they stay together: while at least [`FEW`] rays meet a node, its
-//! boxes are tested against eight rays at a time, which gives the sets of rays that meet the children. Eight neighbouring
-//! rays lie in a narrow cone, so most boxes are left out for all eight by one cheap test beforehand ([`Rays::cones`]), and
-//! boxes below the tangent hyperplane for all rays, as no ray of the hemisphere goes there.
+//! They start as one set and descend together as long as they stay together. While at least [`FEW`] rays meet a node, its eight
+//! boxes, less the origin, stay in registers, and ray after ray is tested against all eight at once: three products for each
+//! axis. Each box has a word, to which a ray that meets it adds its bit: that is the set of rays of that child.
 //!
-//! Where fewer rays meet a node, a set would cost more in branches that the processor guesses wrong than it saves. Such
-//! rays get the node on a stack of their own. In the end the rays go in step: in a round each takes a node from its stack
-//! and is tested against its eight boxes at a time, without a branch, so that the processor works on several rays, and
-//! waits for several cache lines, at once.
+//! Where fewer rays meet a node, a set would cost more than it saves. Such rays get the node on a stack of their own. In the end
+//! all rays that are left go in step. A step takes what is on top of a ray's stack. If it is a node, the children that
+//! the ray meets are put in its place, leaves last. By what is on top afterwards the ray joins the list of those at a node
+//! or the list of those at a leaf for the next round; a ray that is blocked, or has nothing left, joins neither. So a step
+//! has no branch that a processor could guess wrong, and what the next round needs is fetched a whole round ahead.
 
-use super::cones::Cones;
-use super::directions::{BLOCK, GROUPS, Rays};
+use super::directions::{BLOCK, Rays};
 use super::lanes::Lanes;
-use super::leaves::{HEIGHT_ROUNDING, hits_of_one, hits_of_set};
+use super::leaves::{hits_of_one, hits_of_set};
 use super::query::Query;
-use crate::accel::{TAG_BITS, WIDTH, WideNode};
+use crate::accel::{BOTTOM, LEAF, NODE, Reference, WIDTH, WideNode, place};
 
-/// Fewer rays than this go their own ways.
-const FEW: u32 = 6;
-/// Nodes that a ray may have when it parts from the others.
+/// Fewer rays than this at a node go their own ways.
+const FEW: u32 = 8;
+/// Fewer rays than this at a leaf do.
+const FEW_AT_LEAF: u32 = 3;
+/// Nodes and leaves that a ray may have when it parts from the others.
 const PARTED: usize = 64;
+/// The bits of a reference that tell what it refers to.
+const KIND: u32 = 3;
+/// Ahead of the origin: no ray meets what ends there. Not even the nearest hit is nearer.
+const AHEAD: f32 = f32::from_bits(1);
+/// What near and far sides of boxes are pulled apart by, in proportion, where axes are compared.
+const APART: f32 = 1.0 / (1 << 20) as f32;
 
 /// Working memory of a thread.
 #[derive(Debug)]
 pub(super) struct Traversal<const D: usize> {
-    /// Sets of rays, and the nodes they meet.
-    sets: Vec<(u64, u32)>,
-    /// The stacks of nodes of single rays, each with room for the children of all nodes on the way to a leaf, and where
-    /// they end.
-    stacks: Vec<u32>,
-    ends: [u32; BLOCK],
+    /// Sets of rays, and what they meet.
+    sets: Vec<(u64, Reference)>,
+    /// The stacks of single rays, each with room for the children of all nodes on the way to a leaf, [`BOTTOM`] first; and
+    /// where their tops are.
+    stacks: Vec<Reference>,
+    tops: [u32; BLOCK],
     /// Room of one stack.
     room: usize,
-    /// Pairs of a leaf and a ray, the leaf shifted by [`TAG_BITS`].
-    pairs: Vec<u32>,
-    cones: Cones<D>,
+    /// Rays at a node, this round and next.
+    at_node: [[u8; BLOCK + 1]; 2],
+    /// Rays at a leaf, this round and next.
+    at_leaf: [[u8; BLOCK + 1]; 2],
 }
 
 impl<const D: usize> Traversal<D> {
     pub fn new() -> Self {
-        let (sets, stacks, pairs) = (Vec::new(), Vec::new(), Vec::new());
-        Self { sets, stacks, ends: [0; BLOCK], room: 0, pairs, cones: Cones::new() }
+        let lists = [[0; BLOCK + 1]; 2];
+        Self { sets: Vec::new(), stacks: Vec::new(), tops: [0; BLOCK], room: 0, at_node: lists, at_leaf: lists }
     }
 
     /// Which of the rays `alive` hit something.
     #[inline(always)]
     pub fn blocked<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, alive: u64) -> u64 {
-        if query.wide.nodes.is_empty() {
-            return 0;
-        }
+        let Some(root) = query.wide.root() else { return 0 };
         // Each node leaves at most all but one of its children behind, and a push writes eight words.
-        self.room = PARTED + (WIDTH - 1) * query.wide.depth + 2 * WIDTH;
-        if self.stacks.len() < BLOCK * self.room {
-            self.stacks.resize(BLOCK * self.room, 0);
+        let room = PARTED + (WIDTH - 1) * query.wide.depth + 2 * WIDTH;
+        if self.room != room {
+            self.room = room;
+            self.stacks.resize(BLOCK * room, BOTTOM);
+            (0..BLOCK).for_each(|i| self.stacks[i * room] = BOTTOM);
+            self.sets.resize((WIDTH - 1) * query.wide.depth + 2, (0, BOTTOM));
         }
         for i in 0..BLOCK {
-            self.ends[i] = (i * self.room) as u32;
+            self.tops[i] = (i * room) as u32;
         }
         let limit = L::splat(query.box_limit());
         let mut open = alive;
-        self.together::<L>(query, rays, limit, &mut open);
+        self.together::<L>(query, rays, limit, root, &mut open);
         self.singly::<L>(query, rays, limit, &mut open);
         alive & !open
     }
 
     /// Sets of rays, as long as they are large.
     #[inline(always)]
-    fn together<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, limit: L, open: &mut u64) {
-        self.sets.clear();
-        self.pairs.clear();
-        self.sets.push((*open, 0));
-        while let Some((set, index)) = self.sets.pop() {
+    fn together<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, limit: L, root: Reference, open: &mut u64) {
+        self.sets[0] = (*open, root);
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (set, reference) = self.sets[count];
             let mut set = set & *open;
-            if set.count_ones() < FEW {
-                set = self.part(set, index);
+            let few = if reference & KIND == LEAF { FEW_AT_LEAF } else { FEW };
+            if set.count_ones() < few {
+                set = self.part(set, reference);
                 if set == 0 {
                     continue;
                 }
             }
-            let node = &query.wide.nodes[(index >> TAG_BITS) as usize];
-            let (tests, count) = possible::<L, D>(query, rays, node, set);
-            let mut met = [0u64; WIDTH];
-            for &test in &tests[..count] {
-                let (child, group) = (test as usize % WIDTH, test as usize / WIDTH % GROUPS);
-                let (mut enter, mut exit) = (L::splat(0.0), limit);
-                for k in 0..D {
-                    let [middle, half] = &node.boxes[k];
-                    let absolute = L::load(&rays.absolute[k].as_chunks().0[group]);
-                    let inverse = L::load(&rays.inverse[k].as_chunks().0[group]);
-                    let offset = L::load(&rays.offset[k].as_chunks().0[group]);
-                    let middle = L::splat(middle[child]).mul_sub(inverse, offset);
-                    let half = L::splat(half[child]);
-                    enter = enter.max(absolute.negated_mul_add(half, middle));
-                    exit = exit.min(absolute.mul_add(half, middle));
-                }
-                met[child] |= u64::from(enter.less_or_equal(exit)) << (group * WIDTH);
+            if reference & KIND == LEAF {
+                *open &= !hits_of_set::<L, D>(query, rays, reference, set);
+                continue;
             }
-            for child in 0..WIDTH {
-                let set = met[child] & set & *open;
-                if set == 0 {
-                    continue;
-                }
-                let index = node.children[child];
-                if node.leaves >> child & 1 == 0 {
-                    self.sets.push((set, index));
-                    L::fetch(&query.wide.nodes, index >> TAG_BITS);
-                } else if set.count_ones() < FEW {
-                    L::fetch(&query.wide.leaves, index >> TAG_BITS);
-                    let mut rest = set;
-                    while rest != 0 {
-                        self.pairs.push(index | rest.trailing_zeros());
-                        rest &= rest - 1;
-                    }
-                } else {
-                    *open &= !hits_of_set::<L, D>(query, rays, index >> TAG_BITS, set, &mut self.cones);
-                }
+            let (mut met, [low, high]) = meet_set::<L, D>(query, rays, limit, reference, set);
+            let children = WideNode::<D>::at(query.rows, reference).children();
+            while met != 0 {
+                let child = met.trailing_zeros() as usize % WIDTH;
+                met &= met - 1;
+                self.sets[count] = (u64::from(low[child]) | u64::from(high[child]) << 32, children[child]);
+                count += 1;
+                L::fetch::<D>(query.rows, place(children[child]));
             }
         }
     }
 
-    /// Gives the node to each ray of a set, and returns those that have no room for it.
+    /// Gives a node or leaf to each ray of a set, and returns those that have no room for it.
     #[inline(always)]
-    fn part(&mut self, set: u64, index: u32) -> u64 {
+    fn part(&mut self, set: u64, reference: Reference) -> u64 {
         let mut full = 0;
         let mut rest = set;
         while rest != 0 {
             let i = rest.trailing_zeros() as usize;
             rest &= rest - 1;
-            let end = self.ends[i] as usize;
-            if end < i * self.room + PARTED {
-                self.stacks[end] = index;
-                self.ends[i] += 1;
+            let top = self.tops[i] as usize + 1;
+            if top < i * self.room + PARTED {
+                self.stacks[top] = reference;
+                self.tops[i] = top as u32;
             } else {
                 full |= 1 << i;
             }
@@ -139,117 +125,106 @@ impl<const D: usize> Traversal<D> {
         full
     }
 
-    /// Every ray with nodes left on its stack by itself.
+    /// Every ray with something left on its stack by itself.
     #[inline(always)]
     fn singly<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, limit: L, open: &mut u64) {
-        let mut going = [0u8; BLOCK];
-        let mut count = 0;
-        for i in 0..BLOCK {
-            going[count] = i as u8;
-            count += usize::from(self.ends[i] as usize > i * self.room);
+        let Self { stacks, tops, at_node, at_leaf, .. } = self;
+        let (mut now, mut nodes, mut leaves) = (0, 0, 0);
+        let mut rest = *open;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            let kind = stacks[tops[i] as usize] & KIND;
+            (at_node[0][nodes], at_leaf[0][leaves]) = (i as u8, i as u8);
+            nodes += usize::from(kind == NODE);
+            leaves += usize::from(kind == LEAF);
         }
-        let mut waiting = self.pairs.len();
-        if waiting < (BLOCK + 1) * WIDTH {
-            self.pairs.resize((BLOCK + 1) * WIDTH, 0);
+        let mut origin = [limit; D];
+        for k in 0..D {
+            origin[k] = L::splat(query.scaled[k]);
         }
-        loop {
-            for &pair in &self.pairs[..waiting] {
-                let i = pair as usize % BLOCK;
-                if *open >> i & 1 == 1 && hits_of_one::<L, D>(query, rays, pair >> TAG_BITS, i) {
-                    *open &= !(1 << i);
-                }
-            }
-            if count == 0 {
-                return;
-            }
-            let before = count;
-            (count, waiting) = (0, 0);
-            for k in 0..before {
-                let ray = going[k];
+        while nodes + leaves > 0 {
+            let next = 1 - now;
+            let (mut next_nodes, mut next_leaves) = (0, 0);
+            for n in 0..nodes {
+                let ray = at_node[now][n];
                 let i = ray as usize % BLOCK;
-                if *open >> i & 1 == 0 {
-                    continue;
-                }
-                let end = self.ends[i] as usize - 1;
-                let node = &query.wide.nodes[(self.stacks[end] >> TAG_BITS) as usize];
-                let (mut enter, mut exit) = (L::splat(0.0), limit);
+                let top = tops[i] as usize;
+                let node = WideNode::<D>::at(query.rows, stacks[top]);
+                let (mut enter, mut exit) = (L::splat(AHEAD), limit);
                 for k in 0..D {
-                    let [middle, half] = &node.boxes[k];
                     let absolute = L::splat(rays.absolute[k][i]);
-                    let middle = L::load(middle).mul_sub(L::splat(rays.inverse[k][i]), L::splat(rays.offset[k][i]));
-                    let half = L::load(half);
+                    let middle = L::load(node.middle(k)).sub(origin[k]).mul(L::splat(rays.inverse[k][i]));
+                    let half = L::load(node.half(k));
                     enter = enter.max(absolute.negated_mul_add(half, middle));
                     exit = exit.min(absolute.mul_add(half, middle));
                 }
-                let met = enter.less_or_equal(exit);
-                let end = end + compress::<L>(&node.children, 0, met & !node.leaves, &mut self.stacks, end);
-                waiting += compress::<L>(&node.children, u32::from(ray), met & node.leaves, &mut self.pairs, waiting);
-                self.ends[i] = end as u32;
-                going[count] = ray;
-                count += usize::from(end > i * self.room);
-                // The node for the next round; if there is none, any.
-                L::fetch(&query.wide.nodes, self.stacks[end.saturating_sub(1)] >> TAG_BITS);
+                let met = enter.less_or_equal(exit.mul(L::splat(1.0 + APART)));
+                let Some(end) = stacks.get_mut(top..).and_then(<[u32]>::first_chunk_mut) else { unreachable!() };
+                L::compress(node.children(), met, end);
+                let top = top + met.count_ones() as usize - 1;
+                tops[i] = top as u32;
+                let reference = stacks[top];
+                (at_node[next][next_nodes], at_leaf[next][next_leaves]) = (ray, ray);
+                next_nodes += usize::from(reference & KIND == NODE);
+                next_leaves += usize::from(reference & KIND == LEAF);
+                L::fetch::<D>(query.rows, place(reference));
             }
-            for &pair in &self.pairs[..waiting] {
-                L::fetch(&query.wide.leaves, pair >> TAG_BITS);
+            for n in 0..leaves {
+                let ray = at_leaf[now][n];
+                let i = ray as usize % BLOCK;
+                let top = tops[i] as usize;
+                let [mut hit, doubtful] = hits_of_one::<L, D>(query, rays, stacks[top], i);
+                if doubtful {
+                    hit = hits_of_set::<L, D>(query, rays, stacks[top], 1 << i) != 0;
+                }
+                let top = top - 1;
+                tops[i] = top as u32;
+                let reference = stacks[top];
+                *open &= !(u64::from(hit) << i);
+                (at_node[next][next_nodes], at_leaf[next][next_leaves]) = (ray, ray);
+                next_nodes += usize::from(!hit & (reference & KIND == NODE));
+                next_leaves += usize::from(!hit & (reference & KIND == LEAF));
+                L::fetch::<D>(query.rows, place(reference));
             }
+            (nodes, leaves, now) = (next_nodes, next_leaves, next);
         }
     }
 }
 
-/// The boxes of a node that groups of rays of the set may meet, each as group * 8 + child, and how many.
+/// Which children of a node rays of a set meet; and for each child those rays, the first 32 and the others.
 #[inline(always)]
-fn possible<L: Lanes, const D: usize>(
+fn meet_set<L: Lanes, const D: usize>(
     query: &Query<D>,
     rays: &Rays<D>,
-    node: &WideNode<D>,
+    limit: L,
+    node: Reference,
     set: u64,
-) -> ([u32; BLOCK + WIDTH], usize) {
-    // The ball around each box: where it is, the square of its distance and of its radius; and how high the box reaches
-    // above the tangent hyperplane.
-    let zero = L::splat(0.0);
-    let (mut height, mut distance, mut radius) = (zero, zero, zero);
-    let mut away = [zero; D];
+) -> (u8, [[u32; WIDTH]; 2]) {
+    let node = WideNode::<D>::at(query.rows, node);
+    let (mut middles, mut halves) = ([limit; D], [limit; D]);
     for k in 0..D {
-        let [middle, half] = &node.boxes[k];
-        let (middle, half) = (L::load(middle).sub(L::splat(query.centred[k])), L::load(half));
-        distance = middle.mul_add(middle, distance);
-        radius = half.mul_add(half, radius);
-        height = middle.mul_add(L::splat(query.normal[k]), height);
-        height = half.mul_add(L::splat(query.normal[k].abs()), height);
-        away[k] = middle;
+        middles[k] = L::load(node.middle(k)).sub(L::splat(query.scaled[k]));
+        halves[k] = middles[k].abs().mul_add(L::splat(APART), L::load(node.half(k)));
     }
-    let above = node.used & L::splat(-HEIGHT_ROUNDING).less_or_equal(height);
-    // The cone of rays of half-angle a meets the ball, seen under the half-angle b, unless the angle between its axis and
-    // the ball's middle m exceeds a + b: m . axis < |m| cos(a + b) = cos a sqrt(m^2 - r^2) - sin a r.
-    // Less by more than the rounding of both squares, which their difference may bring out.
-    let tangent = distance.mul(L::splat(1.0 - 4e-6)).sub(radius);
-    let around = tangent.less_or_equal(L::splat(1e-6));
-    let (tangent, radius) = (tangent.max(zero).square_root(), radius.square_root());
-    let mut tests = [0; BLOCK + WIDTH];
-    let mut count = 0;
-    for group in 0..GROUPS {
-        if set >> (group * WIDTH) & 0xff == 0 {
-            continue;
+    let mut all = [L::unmarked(); 2];
+    for part in 0..2 {
+        let mut marks = L::unmarked();
+        let mut rest = (set >> (32 * part)) as u32;
+        while rest != 0 {
+            let i = 32 * part + rest.trailing_zeros() as usize;
+            let bit = rest & rest.wrapping_neg();
+            rest &= rest - 1;
+            let (mut enter, mut exit) = (L::splat(AHEAD), limit);
+            for k in 0..D {
+                let absolute = L::splat(rays.absolute[k][i]);
+                let middle = middles[k].mul(L::splat(rays.inverse[k][i]));
+                enter = enter.max(absolute.negated_mul_add(halves[k], middle));
+                exit = exit.min(absolute.mul_add(halves[k], middle));
+            }
+            marks = enter.mark(exit, bit, marks);
         }
-        let cone = &rays.cones[group];
-        let mut along = L::splat(1e-5);
-        for k in 0..D {
-            along = away[k].mul_add(L::splat(cone.axis[k]), along);
-        }
-        along = radius.mul_add(L::splat(cone.sine), along);
-        let meets = tangent.mul(L::splat(cone.cosine)).less_or_equal(along) | around;
-        let tag = (group * WIDTH) as u32;
-        count += compress::<L>(&[0, 1, 2, 3, 4, 5, 6, 7], tag, meets & above, &mut tests, count);
+        all[part] = marks;
     }
-    (tests, count)
-}
-
-/// Compresses into a longer array at a place.
-#[inline(always)]
-fn compress<L: Lanes>(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32], place: usize) -> usize {
-    let Some(out) = out.get_mut(place..).and_then(<[u32]>::first_chunk_mut) else {
-        unreachable!("stacks have room for the depth of the tree, the others for eight children of each ray");
-    };
-    L::compress(words, tag, mask, out)
+    (L::any_marked(all), all.map(L::words))
 }

@@ -6,8 +6,8 @@
 
 use std::arch::x86_64::*;
 
-use super::lanes::{Lanes, Row};
-use crate::accel::WIDTH;
+use super::lanes::{Lanes, Words};
+use crate::accel::{Row, WIDTH};
 
 /// For each mask the places of its bits, for the permutation that brings them to the front.
 static PLACES: [[u8; WIDTH]; 256] = places();
@@ -33,13 +33,13 @@ const fn places() -> [[u8; WIDTH]; 256] {
 macro_rules! arithmetic {
     () => {
         #[inline(always)]
-        fn load(row: &Row) -> Self {
+        fn load(row: &[f32; WIDTH]) -> Self {
             // SAFETY: AVX by the level; a row is 32 readable bytes, of any alignment.
             Self(unsafe { _mm256_loadu_ps(row.as_ptr()) })
         }
 
         #[inline(always)]
-        fn store(self, row: &mut Row) {
+        fn store(self, row: &mut [f32; WIDTH]) {
             // SAFETY: AVX by the level; a row is 32 writable bytes, of any alignment.
             unsafe { _mm256_storeu_ps(row.as_mut_ptr(), self.0) }
         }
@@ -66,6 +66,18 @@ macro_rules! arithmetic {
         fn mul(self, other: Self) -> Self {
             // SAFETY: AVX by the level.
             Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            // SAFETY: AVX by the level.
+            Self(unsafe { _mm256_div_ps(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn square_root(self) -> Self {
+            // SAFETY: AVX by the level.
+            Self(unsafe { _mm256_sqrt_ps(self.0) })
         }
 
         #[inline(always)]
@@ -105,18 +117,44 @@ macro_rules! arithmetic {
         }
 
         #[inline(always)]
-        fn fetch<T>(items: &[T], index: u32) {
-            let start = items.as_ptr().wrapping_add(index as usize).cast::<i8>();
-            for line in 0..size_of::<T>().div_ceil(64) {
-                // SAFETY: SSE by the level; a prefetch may be of any address.
-                unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
+        fn unmarked() -> __m256i {
+            // SAFETY: AVX by the level.
+            unsafe { _mm256_setzero_si256() }
+        }
+
+        #[inline(always)]
+        fn mark(self, other: Self, bit: u32, marks: __m256i) -> __m256i {
+            // SAFETY: AVX2 by the level.
+            unsafe {
+                let met = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0));
+                _mm256_or_si256(marks, _mm256_and_si256(met, _mm256_set1_epi32(bit as i32)))
             }
         }
 
         #[inline(always)]
-        fn square_root(self) -> Self {
-            // SAFETY: AVX by the level.
-            Self(unsafe { _mm256_sqrt_ps(self.0) })
+        fn words(marks: __m256i) -> Words {
+            let mut words = [0; WIDTH];
+            // SAFETY: AVX by the level; an array of eight words is 32 writable bytes, of any alignment.
+            unsafe { _mm256_storeu_si256(words.as_mut_ptr().cast(), marks) }
+            words
+        }
+
+        #[inline(always)]
+        fn any_marked([one, other]: [__m256i; 2]) -> u8 {
+            // SAFETY: AVX2 by the level.
+            unsafe {
+                let none = _mm256_cmpeq_epi32(_mm256_or_si256(one, other), _mm256_setzero_si256());
+                !(_mm256_movemask_ps(_mm256_castsi256_ps(none)) as u8)
+            }
+        }
+
+        #[inline(always)]
+        fn fetch<const D: usize>(rows: &[Row], place: usize) {
+            let start = rows.as_ptr().wrapping_add(place).cast::<i8>();
+            for line in 0..5 {
+                // SAFETY: SSE by the level; a prefetch may be of any address.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
+            }
         }
 
         #[inline(always)]
@@ -144,6 +182,8 @@ macro_rules! arithmetic {
 pub(super) struct Avx2(__m256);
 
 impl Lanes for Avx2 {
+    type Marks = __m256i;
+
     arithmetic!();
 
     #[inline(always)]
@@ -153,14 +193,13 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize {
+    fn compress(words: &Words, mask: u8, out: &mut Words) {
         // SAFETY: AVX2 by the level; all three arrays are as long as what is read or written.
         unsafe {
             let places = _mm256_cvtepu8_epi32(_mm_loadl_epi64(PLACES[mask as usize].as_ptr().cast()));
-            let words = _mm256_or_si256(_mm256_loadu_si256(words.as_ptr().cast()), _mm256_set1_epi32(tag as i32));
+            let words = _mm256_loadu_si256(words.as_ptr().cast());
             _mm256_storeu_si256(out.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(words, places));
         }
-        mask.count_ones() as usize
     }
 }
 
@@ -169,6 +208,8 @@ impl Lanes for Avx2 {
 pub(super) struct Avx512(__m256);
 
 impl Lanes for Avx512 {
+    type Marks = __m256i;
+
     arithmetic!();
 
     #[inline(always)]
@@ -178,13 +219,12 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn compress(words: &[u32; WIDTH], tag: u32, mask: u8, out: &mut [u32; WIDTH]) -> usize {
+    fn compress(words: &Words, mask: u8, out: &mut Words) {
         // SAFETY: AVX-512F and VL by the level; both arrays are as long as what is read or written. Compressing into a
         // register first: compressing into memory is microcode on some processors.
         unsafe {
-            let words = _mm256_or_si256(_mm256_loadu_si256(words.as_ptr().cast()), _mm256_set1_epi32(tag as i32));
+            let words = _mm256_loadu_si256(words.as_ptr().cast());
             _mm256_storeu_si256(out.as_mut_ptr().cast(), _mm256_maskz_compress_epi32(mask, words));
         }
-        mask.count_ones() as usize
     }
 }

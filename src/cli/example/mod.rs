@@ -1,0 +1,112 @@
+//! `ao4d example`: the shipped pipelines, for whoever has the program alone.
+//!
+//! They are part of the program, with the meshes and images that they read. Written out they keep their places to each
+//! other, so the paths in them hold; beside them goes the JSON Schema, named in the first line of each, by which editors
+//! complete and check as one types.
+
+mod shipped;
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::console::Console;
+use super::{Failure, Outcome};
+use shipped::{DATA, PIPELINES};
+
+/// The schema's file.
+const SCHEMA: &str = "ao4d.schema.json";
+
+/// What `example` takes.
+#[derive(Args, Debug)]
+pub struct Example {
+    /// Which one, such as two_tetrahedra or lessons/02_cube; `all` for all of them; lists them if left out
+    name: Option<String>,
+    /// Write it into this folder
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    out: PathBuf,
+    /// Write over files that are there already
+    #[arg(long)]
+    force: bool,
+}
+
+impl Example {
+    pub fn execute(self, console: &Console) -> Result<Outcome, Failure> {
+        let Some(name) = &self.name else {
+            let width = PIPELINES.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+            let line = |(name, text): &(&str, &str)| format!("{name:width$}  {}\n", about(text));
+            console.result(&PIPELINES.iter().map(line).collect::<String>())?;
+            return Ok(Outcome::Done);
+        };
+        let plain = |name: &str| name.trim_end_matches(".yaml").replace('-', "_");
+        let wanted = plain(name);
+        // The last part of a name will do where it is one example's alone.
+        let ends = |known: &str| known.rsplit('/').next() == Some(wanted.as_str());
+        let found: Vec<_> = match PIPELINES.iter().find(|(known, _)| *known == wanted) {
+            Some(found) => vec![found],
+            None if wanted == "all" => PIPELINES.iter().collect(),
+            None => PIPELINES.iter().filter(|(known, _)| ends(known)).collect(),
+        };
+        if found.is_empty() || (found.len() > 1 && wanted != "all") {
+            let known = PIPELINES.iter().map(|(name, _)| *name);
+            let message = ao4d::pipeline::unknown_word(&format!("there is no example `{name}`"), &wanted, known);
+            return Err(Failure::refused(message));
+        }
+        let mut files: Vec<(PathBuf, Vec<u8>)> = vec![(SCHEMA.into(), schema()?)];
+        for (name, text) in &found {
+            let up = "../".repeat(name.matches('/').count());
+            let text = format!("# yaml-language-server: $schema={up}{SCHEMA}\n{text}");
+            files.push((format!("{name}.yaml").into(), text.into_bytes()));
+        }
+        let needed = |folder: &str| found.iter().any(|(_, text)| text.contains(&format!("{folder}/")));
+        for (path, bytes) in DATA {
+            let folder = path.split('/').next().unwrap_or_default();
+            if needed(folder) {
+                files.push((path.into(), bytes.to_vec()));
+            }
+        }
+        let there = |(file, bytes): &&(PathBuf, Vec<u8>)| {
+            let path = self.out.join(file);
+            // What is there already as it would be written is in nobody's way.
+            path.exists() && !std::fs::read(&path).is_ok_and(|found| found == *bytes)
+        };
+        if let Some((file, _)) = files.iter().find(there).filter(|_| !self.force) {
+            let path = self.out.join(file);
+            return Err(Failure::refused(format!(
+                "{} is there already; write elsewhere by --out, or over it by --force",
+                path.display()
+            )));
+        }
+        for (file, bytes) in &files {
+            super::write(&self.out.join(file), bytes)?;
+        }
+        for (name, _) in &found {
+            let path = self.out.join(format!("{name}.yaml"));
+            console.result(&path.display().to_string())?;
+        }
+        if let [(name, _)] = found[..] {
+            console.tell(&format!("run it by: ao4d run {}", self.out.join(format!("{name}.yaml")).display()));
+        }
+        Ok(Outcome::Done)
+    }
+}
+
+fn schema() -> Result<Vec<u8>, Failure> {
+    let text = serde_json::to_string_pretty(&ao4d::pipeline::schema()).map_err(|e| Failure::Failed(Box::new(e)))?;
+    Ok((text + "\n").into_bytes())
+}
+
+/// Characters of what a list says of an example.
+const LONGEST: usize = 90;
+
+/// What an example shows: the beginning of the comment that opens it.
+fn about(text: &str) -> String {
+    let comment: Vec<&str> = text.lines().map_while(|line| line.strip_prefix('#')).map(str::trim).collect();
+    let comment = comment.join(" ");
+    let end = [". ", ": ", "; "].iter().filter_map(|mark| comment.find(mark)).min().unwrap_or(comment.len());
+    let first = comment[..end].trim_end_matches('.');
+    match first.char_indices().nth(LONGEST) {
+        None => first.to_owned(),
+        Some((end, _)) => format!("{} ...", first[..end].rsplit_once(' ').map_or(first, |(words, _)| words)),
+    }
+}
