@@ -80,7 +80,6 @@ const KNOWN_CIRCLES: &[&[&str]] = &[
         "stages/subject.rs",
         "stages/write/mod.rs",
         "stages/write/files.rs",
-        "stages/write/join.rs",
     ],
 ];
 

@@ -18,7 +18,7 @@ use serde::Serialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::Plan;
+use super::{Piece, Plan};
 
 /// A field that a key leaves out, and why no byte of a result depends on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -251,4 +251,20 @@ pub fn program() -> String {
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+impl Plan {
+    /// The files that a stage leaves and the cache knows, each with its key; of a piece its parts.
+    pub fn left(&self, index: usize, keys: &Keys) -> Vec<Output> {
+        match self.piece {
+            None => self.outputs(index, keys),
+            Some(piece) => self.left_by(index, keys, piece),
+        }
+    }
+
+    /// The same of a piece, with keys that know it.
+    pub fn left_by(&self, index: usize, keys: &Keys, piece: Piece) -> Vec<Output> {
+        let keyed =
+            |output: Output| Output { key: keys.hash(&(&output.key, "piece", piece.index(), piece.count())), ..output };
+        self.parts(index, keys, piece).into_iter().map(keyed).collect()
+    }
 }

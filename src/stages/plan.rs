@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
-use super::{Invalid, Keys, Output, Piece, Stage, StagePlan};
+use super::{Invalid, Piece, Stage, StagePlan};
 
 /// Everything a run needs to know.
 #[derive(Clone, Debug)]
@@ -151,19 +151,6 @@ impl Plan {
     pub fn all_files_of(&self, index: usize) -> Vec<PathBuf> {
         let named = self.files_of(index).into_iter().map(Path::to_owned);
         named.chain(self.files_beside(index)).collect()
-    }
-
-    /// The files that a stage leaves and the cache knows, each with its key; of a piece its parts.
-    pub fn left(&self, index: usize, keys: &Keys) -> Vec<Output> {
-        match self.piece {
-            None => self.outputs(index, keys),
-            Some(piece) => self.left_by(index, keys, piece),
-        }
-    }
-
-    /// The same of a piece.
-    pub fn left_by(&self, index: usize, keys: &Keys, piece: Piece) -> Vec<Output> {
-        self.parts(index, keys, piece).into_iter().map(|output| piece.keyed(output, keys)).collect()
     }
 
     /// The same plan for a piece of the run.

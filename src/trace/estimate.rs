@@ -26,7 +26,10 @@
 use super::groups::Groups;
 use super::noise;
 use super::sampling::{Sampler, Target};
-use crate::geometry::Dimension;
+use crate::geometry::{Dimension, Vector};
+
+/// Is told of each ray where it goes, and whether it escapes.
+pub type Watch<'w, const D: usize> = dyn FnMut(Vector<D>, bool) + 'w;
 
 /// How much more even several groups are together, as a share of the exponent that the rate of convergence gives.
 pub(super) const GAIN: f64 = 0.6;

@@ -26,7 +26,7 @@ mod surroundings;
 mod translucent;
 
 pub use backend::{Error, NOTHING, RayBackend};
-pub use estimate::Estimate;
+pub use estimate::{Estimate, Watch};
 pub use gather::{Gathered, gather};
 pub use point::ShadingPoint;
 pub use sampling::{Sampler, Sampling, Sequence, Target, cube_to_ball, direction, square_to_disk};

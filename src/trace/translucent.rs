@@ -8,12 +8,9 @@
 //! At a vertex the simplices around it hide cones of directions. A ray that starts in them begins below a surface, and loses
 //! what one surface takes, once for each object there. What takes nothing counts as not being there.
 //!
-//! Packets tell which rays hit nothing at all; the others are looked at here ray by ray, without SIMD. Scenes of opaque objects never
-//! come here.
+//! Here it is done ray by ray; the processor's packets tell which rays hit nothing at all (`cpu/passing.rs`), and leave the others.
+//! Scenes of opaque objects never come here.
 
-use rayon::prelude::*;
-
-use super::cpu::PacketTracer;
 use super::estimate::Estimate;
 use super::shares::Shares;
 use super::surroundings::star_cone;
@@ -23,52 +20,8 @@ use crate::geometry::{Cone, Dimension, Frame, Ray, Vector};
 use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress};
 
-/// Points that a thread takes at a time.
-const BATCH: usize = 16;
 /// Rays between two looks at whether to go on.
 const RAYS_BETWEEN_LOOKS: u32 = 1 << 8;
-
-/// The values at points, in their order.
-pub(super) fn open_fractions<const D: usize>(
-    tracer: &Tracer<D>,
-    points: &[ShadingPoint<D>],
-    sampling: &Sampling,
-    progress: &dyn Progress,
-) -> Result<Vec<Estimate>, Cancelled> {
-    tracer.prepare_wide();
-    // What takes nothing is hit by packets all the same, and counts at vertices for the ways they are approached.
-    let has_nothing = tracer.mesh().objects.iter().any(|object| object.opacity <= 0.0);
-    let found = points.par_chunks(BATCH).map_init(PacketTracer::default, |packets, points| {
-        let estimate = |point| {
-            let found = match has_nothing || sampling.target.is_some() {
-                true => estimate_at(tracer, point, sampling, progress)?,
-                false => estimate_by(packets, tracer, point, sampling, progress)?,
-            };
-            progress.advance(1);
-            Ok(found)
-        };
-        points.iter().map(estimate).collect::<Result<Vec<_>, Cancelled>>()
-    });
-    Ok(found.collect::<Result<Vec<_>, Cancelled>>()?.concat())
-}
-
-/// The value at one point, of as many rays as the sampling says: [`estimate_at`]'s, bit for bit.
-fn estimate_by<const D: usize>(
-    packets: &mut PacketTracer<D>,
-    tracer: &Tracer<D>,
-    point: &ShadingPoint<D>,
-    sampling: &Sampling,
-    progress: &dyn Progress,
-) -> Result<Estimate, Cancelled> {
-    let rays = Rays::of(tracer, point, sampling);
-    if rays.normal.amax() == 0.0 {
-        return Ok(Estimate::known(1.0));
-    }
-    let mut shares = Shares::new(sampling.sampler, Dimension::of::<D>());
-    let mut watch = |direction, is_open| shares.add(if is_open { 1.0 } else { rays.share(direction) });
-    packets.watched(tracer, point, sampling, &mut watch, progress)?;
-    Ok(shares.estimate())
-}
 
 /// The value at one point.
 pub(super) fn estimate_at<const D: usize>(
@@ -94,24 +47,26 @@ pub(super) fn estimate_at<const D: usize>(
 }
 
 /// All that decides what rays from a point bring.
-struct Rays<'t, const D: usize> {
+pub(super) struct Rays<'t, const D: usize> {
     tracer: &'t Tracer<D>,
     position: Vector<D>,
-    normal: Vector<D>,
+    /// The normal at the point; 0 where nothing is.
+    pub normal: Vector<D>,
     limit: f32,
     star: Vec<Around<D>>,
     ignored: Vec<u32>,
 }
 
 impl<'t, const D: usize> Rays<'t, D> {
-    fn of(tracer: &'t Tracer<D>, point: &ShadingPoint<D>, sampling: &Sampling) -> Self {
+    /// Those from a point.
+    pub fn of(tracer: &'t Tracer<D>, point: &ShadingPoint<D>, sampling: &Sampling) -> Self {
         let (position, normal) = (point.position(tracer.mesh()), point.normal(tracer.mesh()));
         let star = if normal.amax() == 0.0 { Vec::new() } else { star(tracer, point, normal) };
         Self { tracer, position, normal, limit: sampling.max_distance, star, ignored: point.ignored(tracer) }
     }
 
     /// The share of light that passes along a ray.
-    fn share(&self, direction: Vector<D>) -> f64 {
+    pub fn share(&self, direction: Vector<D>) -> f64 {
         let ray = Ray::new(self.position, direction);
         let hides = |around: &&Around<D>| around.cones.iter().any(|cone| cone.contains(&ray.direction));
         let near: f64 = self.star.iter().filter(hides).map(|around| around.passed).product();

@@ -21,8 +21,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::{Keys, Output};
-
 pub use joined::Joined;
 pub use record::{Bits, Record};
 pub use values::Values;
@@ -120,11 +118,6 @@ impl Piece {
     /// Where it works, for a pipeline whose files go into `out`.
     pub fn folder(self, out: &Path) -> PathBuf {
         folder(out, self.count).join(self.index.to_string())
-    }
-
-    /// An output with a key that knows the piece.
-    pub(in crate::stages) fn keyed(self, output: Output, keys: &Keys) -> Output {
-        Output { key: keys.hash(&(&output.key, "piece", self.index, self.count)), ..output }
     }
 }
 

@@ -4,9 +4,10 @@
 //! - [`ScalarBackend`]: the slow twin, ray by ray, which defines the values; the packets give the same bits.
 
 mod packet;
+mod passing;
 mod scalar;
 
-pub use packet::{Level, PacketTracer, Watch};
+pub use packet::{Level, PacketTracer};
 pub use scalar::{ScalarBackend, estimate_at};
 
 pub(super) use scalar::first_hit;
@@ -15,7 +16,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{Error, Estimate, RayBackend, Sampling, ShadingPoint, Target, translucent};
+use super::{Error, Estimate, RayBackend, Sampling, ShadingPoint, Target};
 use crate::accel::Tracer;
 use crate::geometry::Ray;
 use crate::progress::Progress;
@@ -62,7 +63,7 @@ impl<const D: usize> RayBackend<D> for CpuBackend<D> {
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>, Error> {
         if self.tracer.mesh().is_translucent() {
-            return Ok(translucent::open_fractions(&self.tracer, points, sampling, progress)?);
+            return Ok(passing::open_fractions(&self.tracer, points, sampling, progress)?);
         }
         self.tracer.prepare_wide();
         let usual = sampling.target.map_or(sampling.samples, |_| Target::FEWEST.min(sampling.samples));

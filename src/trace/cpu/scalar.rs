@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::packet::Watch;
 use crate::accel::Tracer;
 use crate::geometry::{Dimension, Ray};
 use crate::progress::{Cancelled, Progress};
-use crate::trace::estimate::{Accumulator, Estimate};
+use crate::trace::estimate::{Accumulator, Estimate, Watch};
 use crate::trace::{Error, NOTHING, RayBackend, Sampling, Sequence, ShadingPoint, Surroundings, translucent};
 
 /// Rays between two looks at whether to go on: some milliseconds, in very large scenes a tenth of a second.

@@ -30,4 +30,4 @@ mod view;
 mod x86;
 
 pub use level::Level;
-pub use tracer::{PacketTracer, Watch};
+pub use tracer::PacketTracer;

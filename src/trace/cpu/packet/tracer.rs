@@ -15,7 +15,7 @@ use crate::geometry::{Dimension, Frame, Ray, Vector};
 use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
 use crate::trace::cpu::scalar::{estimate_at, watched_at};
-use crate::trace::estimate::{Accumulator, Estimate};
+use crate::trace::estimate::{Accumulator, Estimate, Watch};
 use crate::trace::sampling::LOWEST_SQUARED_COSINE;
 use crate::trace::{Sampler, Sampling, Sequence, ShadingPoint, Target};
 
@@ -34,9 +34,6 @@ pub struct PacketTracer<const D: usize> {
     star: VertexStar<D>,
     traversal: Traversal<D>,
 }
-
-/// Is told of each ray where it goes, and whether it escapes.
-pub type Watch<'w, const D: usize> = dyn FnMut(Vector<D>, bool) + 'w;
 
 /// Rays to be traced from one point.
 enum Source<'a, const D: usize> {
