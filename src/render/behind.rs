@@ -17,12 +17,13 @@
 use rayon::prelude::*;
 
 use super::gbuffer::{GBuffer, RowMut};
+use super::inside::inside;
 use super::light::reflectance;
 use super::samples::Group;
 use super::surface::{Hit, SurfacePass, facing};
 use super::visibility::Passages;
 use super::{Columns, Shading};
-use crate::geometry::{Cone, Vector64, narrow, normal_of, widen};
+use crate::geometry::{Cone, normal_of, widen};
 use crate::occlusion::{Error, Estimator};
 use crate::progress::{Progress, Uncounted};
 use crate::trace::{RayBackend, ShadingPoint};
@@ -165,11 +166,10 @@ impl<const D: usize> Behind<'_, D> {
     /// A shading point in this layer of a voxel.
     fn point(&self, hit: &Hit<D>, index: [usize; 3], layer: usize) -> ShadingPoint<D> {
         let corners = self.pass.tracer.mesh().corners(hit.simplex).map(|v| widen(&v));
-        let weights = hit.crossing.barycentric;
         let grid = &self.pass.sampling.grid;
         let voxel = index[0] + grid.dimensions[0] * (index[1] + grid.dimensions[1] * index[2]);
         ShadingPoint::Inside {
-            position: narrow(&(0..D).fold(Vector64::zeros(), |p, c| p + corners[c] * weights[c])),
+            position: inside(&corners, &hit.crossing.barycentric),
             normal: facing(normal_of(&corners), &hit.ray),
             simplex: hit.simplex,
             number: (layer * grid.len() + voxel) as u64,

@@ -19,6 +19,7 @@ mod behind;
 mod camera;
 pub mod filters;
 pub mod gbuffer;
+mod inside;
 mod layers;
 mod light;
 mod occlude;

@@ -478,6 +478,67 @@ fn convex_bodies_throw_no_shadow_onto_themselves() {
     no_acne::<4>();
 }
 
+/// A bowl so shallow that nothing in it is darker than 0.97, cut along diagonals on which lie centres of voxels.
+fn shallow_bowl<const D: usize>() {
+    let cells = 6usize;
+    let node = |at: [usize; 3]| (0..D - 1).rev().fold(0, |n, axis| n * (cells + 1) + at[axis]) as u32;
+    let places = |cells: usize| {
+        let last = if D == 4 { cells } else { 1 };
+        (0..last).flat_map(move |k| (0..cells).flat_map(move |j| (0..cells).map(move |i| [i, j, k])))
+    };
+    let vertices = places(cells + 1).map(|at| {
+        let across = Vector64::<D>::from_fn(|r, _| if r < D - 1 { at[r] as f64 * 0.4 - 1.2 } else { 0.0 });
+        across + Vector64::from_fn(|r, _| if r == D - 1 { 0.01 * across.norm_squared() - 0.5 } else { 0.0 })
+    });
+    let mut simplices = Vec::new();
+    for cell in places(cells) {
+        let orders: &[&[usize]] = match D {
+            3 => &[&[0, 1], &[1, 0]],
+            _ => &[&[0, 1, 2], &[0, 2, 1], &[1, 0, 2], &[1, 2, 0], &[2, 0, 1], &[2, 1, 0]],
+        };
+        for order in orders {
+            let mut at = cell;
+            let corners: Vec<u32> = std::iter::once(None)
+                .chain(order.iter().map(Some))
+                .map(|axis| {
+                    axis.into_iter().for_each(|&axis| at[axis] += 1);
+                    node(at)
+                })
+                .collect();
+            simplices.push(std::array::from_fn(|corner| corners[corner]));
+        }
+    }
+    let surface = Surface { vertices: vertices.collect(), simplices, normals: None };
+    let camera = Camera::new(&View::default()).unwrap();
+    let mut builder = MeshBuilder::new();
+    builder.add("bowl", [1.0; 3], &surface, Orientation::Facing(camera.viewpoint())).unwrap();
+    let backend: Arc<dyn RayBackend<D>> = Arc::new(CpuBackend::new(Tracer::new(builder.finish())));
+    let shading = Shading::Voxel(Estimator::Sampled(Sampling::new(64, 1)));
+    let mut renderer = Renderer::new(backend, camera, if D == 4 { [20, 20, 20] } else { [20, 20, 1] }, shading);
+    let toward = Vector64::from_fn(|r, _| f64::from(r == D - 1));
+    renderer.lighting = None;
+    let volume = renderer.volume(&[Aov::AmbientOcclusion, Aov::Opacity], &Silent).unwrap();
+    let [occlusion, opacity] = [0, 1].map(|array: usize| volume.arrays[array].values.to_f64());
+    let seen: Vec<f64> = occlusion.iter().zip(&opacity).filter(|(_, o)| **o > 0.0).map(|(a, _)| *a).collect();
+    assert!(seen.len() > 200, "{D}D: {}", seen.len());
+    let darkest = seen.iter().copied().fold(1.0, f64::min);
+    assert!(darkest > 0.9, "{D}D: {darkest}");
+    // The light from straight above reaches them all.
+    let light = Light { source: Source::Directional(-toward), strength: [1.0; 3] };
+    renderer.lighting = Some(Lighting::new(vec![light], 0.0));
+    let volume = renderer.volume(&[Aov::Light, Aov::Opacity], &Silent).unwrap();
+    let [light, opacity] = [0, 1].map(|array: usize| volume.arrays[array].values.to_f64());
+    for (light, _) in light.chunks(3).zip(&opacity).filter(|(_, o)| **o > 0.0) {
+        assert!(light[0] > 0.99, "{D}D: {light:?}");
+    }
+}
+
+#[test]
+fn voxels_on_facets_are_not_darkened_by_neighbours() {
+    shallow_bowl::<3>();
+    shallow_bowl::<4>();
+}
+
 /// A picture is the same bytes however thick its slabs are, and on however many threads it is made.
 fn slabs<const D: usize>(opacity: f32) {
     let mut random = Random(3);
