@@ -40,8 +40,8 @@ SIZE = @SIZE@
 COLOR_BY = @COLOR_BY@
 # Whether a colour bar stands in the last view.
 COLORBAR = @COLORBAR@
-# How edges are drawn: the array that colours them, hidden parts ('thin', 'leave_out' or 'same'), the radius of tubes (None:
-# as fits the picture), and how opaque the skins are that they are drawn over.
+# How edges are drawn: the array that colours them, hidden parts ('thin', 'leave_out' or 'same'), the radius of tubes
+# (None: as fits the picture), and how opaque the skins are that they are drawn over.
 TUBES = @TUBES@
 # From where the volumes are seen, against the middle of the image; +y is up.
 CAMERA = (1.0, 0.72, 1.45)
@@ -513,8 +513,8 @@ def finish_tubes(shown):
         v = [view for name, view in shown if name == array][-1]
         bar, size = GetScalarBar(GetColorTransferFunction(array), v), text_size()
         setp(bar, Title=array, ComponentTitle='', TitleColor=TEXT, LabelColor=TEXT, TitleFontFamily='Arial',
-             LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0, HorizontalTitle=1,
-             LabelFormat='%.2f', RangeLabelFormat='%.2f', UseCustomLabels=1, CustomLabels=[(low + high) / 2],
+             LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0,
+             HorizontalTitle=1, LabelFormat='%.2f', RangeLabelFormat='%.2f', UseCustomLabels=1, CustomLabels=[(low + high) / 2],
              ScalarBarThickness=int(0.6 * size), ScalarBarLength=0.25, Orientation='Vertical')
         for place in ('Any Location', 'AnyLocation'):
             try:
@@ -541,7 +541,7 @@ def show_edges(panel, box, v, aspect):
 
 
 def show_slices_alone(panel, v, aspect):
-    """Surfaces that lie in one space. Several have a colour each, and are cut open as CUT says, to show what is within."""
+    """Surfaces that lie in one space. Several have a colour each, and are cut open as CUT says: that shows what is within."""
     readers = [read_polydata(name) for name in panel['files']]
     filled = [(k, reader) for k, reader in enumerate(readers) if is_filled(reader)]
     light_view(v)

@@ -133,7 +133,7 @@ fn render<'py>(
         Any::Four(session) => memory::picture(&plan.plan, session.clone(), given, progress),
     })?;
     let memory::Seen { volume, accuracy, notes } = seen.map_err(failed)?;
-    let accuracy = accuracy.map(|a| (f64::from(a.rms), f64::from(a.largest), a.voxels));
+    let accuracy = accuracy.map(|a| (a.rms, a.largest, a.voxels));
     picture(py, volume, accuracy, notes)
 }
 

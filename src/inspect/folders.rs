@@ -135,7 +135,9 @@ fn pictures(a: &Path, b: &Path, tolerance: &Tolerance) -> Result<Comparison, Err
 }
 
 /// Width and height, channels, and numbers of a picture.
-fn pixels(path: &Path) -> Result<((u32, u32), usize, Vec<u8>), Error> {
+type Pixels = ((u32, u32), usize, Vec<u8>);
+
+fn pixels(path: &Path) -> Result<Pixels, Error> {
     let refused = |message: String| Error::Picture { path: path.into(), message };
     let file: File = crate::input::open(path).map_err(|cause| Error::Open { path: path.into(), cause })?;
     let mut decoder = png::Decoder::new(BufReader::new(file));

@@ -353,7 +353,7 @@ mod tests {
         assert_eq!(line(&text, "COLOR_BY"), "COLOR_BY = 'rgba'");
         assert_eq!(line(&text, "COLORBAR"), "COLORBAR = False");
         // The cut is a clip of ParaView's, and the other look isn't there.
-        assert!(text.contains("Clip(registrationName") && !text.contains("RELIEF"));
+        assert!(text.contains(": cut', Input=bodies)") && !text.contains("RELIEF"));
 
         figure.film = Some(Film { frames: 72, rate: 24.0 });
         let text = state(&figure);
@@ -369,7 +369,7 @@ mod tests {
         let text = state(&figure);
         assert_eq!(line(&text, "COLOR_BY"), "COLOR_BY = 'ambient_occlusion'");
         assert_eq!(line(&text, "COLORBAR"), "COLORBAR = True");
-        assert!(text.contains("RELIEF") && !text.contains("Clip(registrationName"));
+        assert!(text.contains("RELIEF") && !text.contains(": cut', Input=bodies)"));
         assert_eq!(line(&text, "SOURCE"), "SOURCE = 'raw'");
         assert_eq!(line(&text, "CUT"), "CUT = ('plane', 2, 0.25)");
         assert_eq!(line(&text, "SCREENSHOT"), "SCREENSHOT = None");

@@ -99,11 +99,12 @@ impl ExtrudeSpec {
                 let (points, triangles) = weld.apply(&mesh.points, triangles, notes)?;
                 let interval = Chain::interval(self.layers);
                 if self.caps == Some(true) {
-                    let (points, tetrahedra) =
+                    let ((points, tetrahedra), overlap) =
                         fill(&points, &triangles, progress).map_err(|unfilled| match unfilled {
                             Unfilled::Cancelled => Error::Cancelled,
                             Unfilled::Refused(message) => input.wrong(message).into(),
                         })?;
+                    notes.extend(overlap.map(|overlap| input.wrong(overlap).to_string()));
                     let solid = Chain::of(points.len() as u32, &tetrahedra);
                     self.check_size(points.len(), solid.len(), solid.boundary().len())?;
                     Swept { points, chain: solid.boundary_of_product(&interval) }

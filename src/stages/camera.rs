@@ -120,7 +120,6 @@ pub struct CameraPlan {
     /// In 4D, independent of the line of sight and of `up`.
     pub over: Option<Vec<f64>>,
     /// Until the scene is known: that the eye is to be placed by it, and the share of the image that is to stay empty.
-    #[serde(skip)]
     pub fit: Option<f64>,
 }
 

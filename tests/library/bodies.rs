@@ -856,7 +856,7 @@ fn peels_of_a_hypersphere_are_the_tori_of_hopf() {
         "  - scene: {objects: [{hypersphere: {radius: 2, subdivisions: 12}, transform: [{translate: [0, 1, 0, 0]}]}]}
   - occlusion: {samples: 4}
   - slice: {peel: hopf, center: [0, 1, 0, 0], range: [30, 60], count: 3, vtp: peel.vtp}
-  - slice: {peel: hopf, center: [0, 1, 0, 0], axis: [1, 0, 0], vtp: other.vtp}
+  - slice: {peel: hopf, center: [0, 1, 0, 0], axis: [1, 0, 0], at: 30, vtp: other.vtp}
   - slice: {peel: w, at: -0.5, center: [0, 1, 0, 0], projection: stereographic, vtp: w.vtp}
   - slice: {id: lost, peel: hopf, center: [9, 9, 9, 9], at: 1, pole: [0, 0, 1, 0], vtp: lost.vtp}
 ",

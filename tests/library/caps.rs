@@ -11,7 +11,7 @@ use ao4d::mesh::{MeshBuilder, Orientation, Surface};
 use ao4d::occlusion::Estimator;
 use ao4d::occlusion::exact::{Budget, Hemisphere};
 use ao4d::progress::Silent;
-use ao4d::scene::{ObjectSpec, build_object};
+use ao4d::scene::{ObjectSpec, build_object, build_object_with_notes};
 use ao4d::trace::cpu::{CpuBackend, PacketTracer};
 use ao4d::trace::{RayBackend, Sampling, ShadingPoint};
 use serde_json::{Value, json};
@@ -25,12 +25,17 @@ fn volume<const D: usize>(surface: &Surface<D>) -> f64 {
     enclosed_volume(corners(&surface.vertices, &surface.simplices))
 }
 
-fn capped(surface: &Surface<3>) -> Result<Surface<4>, String> {
-    let folder = tempfile::tempdir().unwrap();
+/// A surface as an OBJ file has it.
+fn text(surface: &Surface<3>) -> String {
     let mut obj = String::new();
     surface.vertices.iter().for_each(|v| writeln!(obj, "v {} {} {}", v[0], v[1], v[2]).unwrap());
     surface.simplices.iter().for_each(|t| writeln!(obj, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap());
-    std::fs::write(folder.path().join("x.obj"), obj).unwrap();
+    obj
+}
+
+fn capped(surface: &Surface<3>) -> Result<Surface<4>, String> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("x.obj"), text(surface)).unwrap();
     build(json!({"extrude": {"mesh": "x.obj", "from": -1, "to": 1, "caps": true}}), folder.path())
 }
 
@@ -133,6 +138,24 @@ fn large_solids_are_filled() {
 }
 
 #[test]
+fn bodies_that_overlap_are_told_by_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |low: f64| {
+        let surface = together(cube(0.0, 1.0, 2), &cube(low, 1.5, 1));
+        std::fs::write(folder.path().join("x.obj"), text(&surface)).unwrap();
+        let object = json!({"extrude": {"mesh": "x.obj", "from": -1, "to": 1, "caps": true}});
+        let mut notes = Vec::new();
+        let spec: ObjectSpec = serde_json::from_value(object).unwrap();
+        build_object_with_notes::<4>(&spec, folder.path(), &mut notes).unwrap();
+        notes
+    };
+    let notes = told(0.6);
+    assert!(notes.len() == 1 && notes[0].starts_with("extrude.mesh: "), "{notes:?}");
+    assert!(notes[0].contains("passes through itself, or has bodies that overlap: the triangles at ("), "{notes:?}");
+    assert_eq!(told(1.0), [""; 0], "those that touch at a corner");
+}
+
+#[test]
 fn surfaces_without_an_inside_are_refused() {
     let mut open = cube(0.0, 1.0, 1);
     open.simplices.pop();
@@ -142,9 +165,7 @@ fn surfaces_without_an_inside_are_refused() {
     pushed.vertices.iter_mut().filter(|v| inner(v[0]) && inner(v[1]) && v[2] == 1.0).for_each(|v| v[2] = -0.5);
     let mut flat = cube(0.0, 1.0, 1);
     flat.vertices.iter_mut().for_each(|v| v[2] = 0.0);
-    let overlapping = together(cube(0.0, 1.0, 2), &cube(0.6, 1.5, 1));
     for (surface, message) in [
-        (overlapping, "passes through itself, or has bodies that overlap: the triangles at ("),
         (open, "is open at 3 edges: caps need a closed surface; repair it, or write caps: false for walls only"),
         (pushed, "passes through itself"),
         (flat, "encloses nothing"),

@@ -442,7 +442,7 @@ fn points_that_differ_by_rounding_are_welded_within_a_tolerance() {
     for (weld, shape, message) in [
         (-1.0, json!({"file": "a.obj"}), "weld: -1 is below 0"),
         (0.5, json!({"file": "a.obj"}), "weld: 0.5 is more than a hundredth of the mesh's extent"),
-        (1e-5, json!({"sphere": {"radius": 1}}), "weld: a sphere has no points to weld"),
+        (1e-5, json!({"sphere": {"radius": 1, "subdivisions": 2}}), "weld: a sphere has no points to weld"),
     ] {
         let error = welded(weld, shape).0.unwrap_err().to_string();
         assert!(error.starts_with(message), "{error}");

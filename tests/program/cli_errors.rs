@@ -83,7 +83,7 @@ fn what_is_not_yaml() {
     refused(
         b"just text\n",
         &[],
-        "p.yaml:1:1: expected a mapping (of name, seed, stages, program, folder, inputs), found the text \"just text\"",
+        "p.yaml:1:1: expected a mapping (of name, seed, stages, program, folder, variables, include, sweep, inputs), found the text \"just text\"",
     );
     with(
         "samples: 16,",
@@ -98,7 +98,7 @@ fn keys_and_types() {
         "(known: id, input, method, samples, target_error, max_samples, max_cones, max_distance, file, load, seed)";
     for (from, to, message) in [
         ("samples:", "^sampels:", format!("stages[1].occlusion.sampels: unknown key, did you mean `samples`? {occlusion_keys}")),
-        ("seed: 1", "^sed: 1", "sed: unknown key, did you mean `seed`? (known: name, seed, stages, program, folder, inputs)".into()),
+        ("seed: 1", "^sed: 1", "sed: unknown key, did you mean `seed`? (known: name, seed, stages, program, folder, variables, include, sweep, inputs)".into()),
         ("- occlusion:", "- ^oclusion:", "stages[1].oclusion: unknown key, did you mean `occlusion`? (known: scene, occlusion, render, write, paraview, mesh, slice, wireframe, animate, shade)".into()),
         ("id: image", "shading: ^smoth", "stages[2].render.shading: unknown value `smoth`, did you mean `smooth`? (known: smooth, flat, voxel, auto)".into()),
         ("samples: 16", "samples: ^many", "stages[1].occlusion.samples: expected a whole number, 0 or above, found the text \"many\"".into()),
@@ -227,7 +227,7 @@ fn references_between_stages() {
         (
             "screenshot: figure.png",
             "input: [image, ^imge]",
-            "stages[4].paraview.input[1]: no earlier render or write or animate is called `imge`, did you mean `image`? (known: files, image)",
+            "stages[4].paraview.input[1]: no earlier render or write or animate or wireframe or slice is called `imge`, did you mean `image`? (known: files, image)",
         ),
         ("file: ao.f32", "load: ^missing.f32", "stages[1].occlusion.load: there is no file missing.f32"),
     ] {

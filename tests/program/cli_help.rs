@@ -69,7 +69,7 @@ fn shells_and_manuals_know_every_verb_and_option() {
     }
     assert!(std::fs::read_to_string(out.join("ao4d.1")).unwrap().contains("ao4d\\-run(1)"));
     let (code, _, told) = ao4d(&["man", "rum"]);
-    assert!(code == Some(2) && told.contains("there is no command `rum` (known: run, check"), "{told}");
+    assert!(code == Some(2) && told.contains("there is no command `rum` (known: run, merge, check"), "{told}");
 }
 
 #[test]

@@ -366,6 +366,10 @@ fn what_cannot_be_told_or_compared_is_refused() {
         for arguments in [&["info", name][..], &["compare", name, "a.vti"], &["compare", "a.vti", name]] {
             let (code, text) = folder.says(arguments);
             assert_eq!(code, 2, "{arguments:?}");
+            if arguments[0] == "compare" && name == "folder.vti" {
+                assert_eq!(text, "error: one is a folder and the other a file; compare two of a kind\n");
+                continue;
+            }
             assert!(text.starts_with(&format!("error: {name}: ")) && text.contains(message), "{text}");
         }
     }

@@ -207,7 +207,7 @@ mod tests {
                 let tint = palette.colours()[usize::from(colours[i])];
                 let shown = tint.map(|x| f32::from(x) / 255.0 * f32::from(shades[i]) / f32::from(SHADES));
                 let off = shown.iter().zip(colour(i)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-                let most = if occlusion.is_some_and(|a| a[i] < DARK) { DARK } else { 0.04 };
+                let most = if voxels.parts(i).1 < DARK { DARK } else { 0.04 };
                 assert!(off <= most, "{i}: {shown:?} {:?}", colour(i));
             }
             assert!(covers.iter().zip(&coverage).all(|(&c, &x)| (c == 0) == (x == 0.0)));

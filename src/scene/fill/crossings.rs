@@ -4,6 +4,8 @@
 //! edges in each other's faces, as boxes side by side do, have no edge that passes through anything; but of one's triangles
 //! some are inside the other and some not.
 
+use std::f64::consts::PI;
+
 use super::LEAST;
 use crate::geometry::Vector64;
 use crate::mesh::UnionFind;
@@ -98,10 +100,11 @@ fn astride(
                     outside = true;
                 } else {
                     looks += body.len();
-                    let turns = body.iter().map(|&i| solid_angle(&corners[i], &middle)).sum::<f64>();
-                    let turns = turns / (4.0 * std::f64::consts::PI);
-                    // On the surface it is between whole numbers.
-                    if (turns - turns.round()).abs() < 0.01 {
+                    let angles = body.iter().map(|&i| solid_angle(&corners[i], &middle));
+                    let (turns, most) = angles.fold((0.0, 0.0), |(sum, most), a| (sum + a, f64::max(most, a.abs())));
+                    let turns = turns / (4.0 * PI);
+                    // On the surface it is between whole numbers, or one triangle fills half of the view.
+                    if (turns - turns.round()).abs() < 0.01 && most < 1.98 * PI {
                         if turns.round() == 0.0 { outside = true } else { inside = Some(triangle) }
                     }
                 }

@@ -16,7 +16,7 @@
 //! triangle on prisms whose flat faces are off by a last digit, most of them slivers), and constrained Delaunay
 //! tetrahedralisation (few pieces, but slivers between corners of a flat face, and no crate with a free licence).
 //!
-//! A surface that is open has no inside and is refused, and so is one that passes through itself, as bodies that overlap do
+//! A surface that is open has no inside and is refused, and one that passes through itself, as bodies that overlap do, is told
 //! ([`crossings`]).
 
 mod apex;
@@ -62,15 +62,16 @@ impl From<String> for Unfilled {
 }
 
 /// The points and the positively oriented tetrahedra of the solid within these triangles. Points with identical coordinates
-/// must be one point. Triangles that face the wrong way are turned.
+/// must be one point. Triangles that face the wrong way are turned. Beside them a complaint, if the surface passes through itself and is filled all the
+/// same.
 ///
 /// # Errors
-/// If the surface is open or passes through itself, or `progress` says to stop.
+/// If the surface is open, or passes through itself in a way that can't be filled, or `progress` says to stop.
 pub fn fill(
     points: &[Vector64<3>],
     triangles: &[[u32; 3]],
     progress: &dyn Progress,
-) -> Result<(Vec<Vector64<3>>, Vec<[u32; 4]>), Unfilled> {
+) -> Result<(Solid, Option<String>), Unfilled> {
     let nothing = || "encloses nothing: all its triangles are flat or cancel".to_owned();
     let triangles = without_pairs(triangles);
     if triangles.is_empty() {
@@ -82,7 +83,7 @@ pub fn fill(
     if enclosed_volume(corners(&near, &triangles)) < LEAST * LEAST {
         return Err(nothing().into());
     }
-    if let Some([one, other]) = crossings::crossing(&near, &triangles) {
+    let overlap = crossings::crossing(&near, &triangles).map(|[one, other]| {
         let middle =
             |i: usize| frame.outwards(&(triangles[i].iter().map(|&p| near[p as usize]).sum::<Vector64<3>>() / 3.0));
         let place = |i: usize| middle(i).iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ");
@@ -90,11 +91,11 @@ pub fn fill(
             true => format!("the triangle at ({}) is inside a body that the rest of its own is not inside", place(one)),
             false => format!("the triangles at ({}) and at ({})", place(one), place(other)),
         };
-        return Err(Unfilled::Refused(format!(
-            "passes through itself, or has bodies that overlap: {how}; unite them in the program that made them, write each as \
-             an object of its own, or write caps: false for walls only"
-        )));
-    }
+        format!(
+            "passes through itself, or has bodies that overlap: {how}; occlusion may be wrong there: unite them in the program that \
+             made them, or write each as an object of its own"
+        )
+    });
     let tries = (MOST_TRIED / triangles.len()).clamp(3, 9);
     let mut best: Option<((usize, usize), Solid)> = None;
     let mut trouble = None;
@@ -122,7 +123,7 @@ pub fn fill(
     }
     match (best, trouble) {
         (Some((_, (_, tetrahedra))), _) if tetrahedra.is_empty() => Err(nothing().into()),
-        (Some((_, solid)), _) => Ok(solid),
+        (Some((_, solid)), _) => Ok((solid, overlap)),
         (None, near) => {
             let [x, y, z] = frame.outwards(&near.unwrap_or_default()).into();
             let message = format!(
@@ -135,7 +136,7 @@ pub fn fill(
 }
 
 /// Points and tetrahedra.
-type Solid = (Vec<Vector64<3>>, Vec<[u32; 4]>);
+pub type Solid = (Vec<Vector64<3>>, Vec<[u32; 4]>);
 
 /// So many tetrahedra a triangle are few.
 const FEW: usize = 4;

@@ -90,7 +90,7 @@ fn a_sweep_runs_all_combinations_and_shares_what_it_can() {
             .all(|f| f["cached"] == true))
     );
     let (_, text, _) = says(&folder, &["info", "--pipeline", "alone/a.vti"], "");
-    assert!(text.contains("tesseract: {size: 40}") && text.contains("samples: 8") && !text.contains("sweep"), "{text}");
+    assert!(text.contains("tesseract: {size: 40,") && text.contains("samples: 8") && !text.contains("sweep"), "{text}");
     assert!(text.contains("eye: [300") && !text.contains("fit"), "{text}");
 }
 

@@ -57,7 +57,7 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
     let mut set = set;
     if view.distance == 0.0 && query.rise > 0.0 {
         let steepest = steepest::<L, D>(&view, &columns, &normal, aside);
-        set &= rays.up_to_height::<L>(steepest / (1.0 + steepest * steepest).sqrt() * (1.0 + 1e-3) + 1e-4);
+        set &= rays.up_to_height::<L>(steepest / (1.0 + steepest * steepest).sqrt() * (1.0 + 2e-2) + 1e-4);
         if set == 0 {
             return 0;
         }
@@ -129,10 +129,12 @@ fn steepest<L: Lanes, const D: usize>(view: &View, columns: &[[L; D]; D], normal
         tangent[k] = up.negated_mul_add(normal[k], middle[k]);
     }
     let length = dot(&tangent, &tangent).square_root();
-    // Rounding of heights and of ways along the tangent is less than a thousandth of the least way.
+    // What is left of a middle straight above the origin is rounding, and no tangent.
+    let firm = length.sub(L::splat(0.02 * (view.size + view.edge)));
+    // Rounding of heights and of ways along the tangent is less than a fiftieth of the least way.
     let least = length.mul(L::splat(1e-3 * (view.size + view.edge))).add(L::splat(UNDERFLOW));
     let (first_height, first_way) = (dot(&columns[0], normal), dot(&columns[0], &tangent));
-    let mut slope = L::splat(0.0);
+    let mut slope = firm.select(L::splat(f32::INFINITY), L::splat(0.0));
     for corner in 0..D {
         let (mut height, mut way) = (first_height, first_way);
         if corner > 0 {
