@@ -820,7 +820,7 @@ fn slices_and_wireframes_are_refused_by_name() {
 /// The area of a file's triangles, and what they enclose, in the file's own points.
 fn sizes_of(mesh: &vtk::UnstructuredGrid) -> [f64; 2] {
     let points: Vec<Vector64<3>> = mesh.points.iter().map(|&p| p.into()).collect();
-    let faces: Vec<[u32; 3]> = mesh.cells().map(|(_, c)| std::array::from_fn(|i| c[i] as u32)).collect();
+    let faces: Vec<[u32; 3]> = mesh.cells().map(|(_, c)| std::array::from_fn(|i| c[i])).collect();
     assert!(facet_pairs(&faces).is_closed());
     [surface_measure(corners(&points, &faces)), enclosed_volume(corners(&points, &faces))]
 }
