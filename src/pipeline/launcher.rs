@@ -58,6 +58,8 @@ impl Launched {
         {
             match tasks {
                 Some(1) => {}
+                // A program that has called MPI for itself alone leaves this to those it starts, as ParaView's do.
+                None if k == 0 => {}
                 Some(n) => return Self::piece(k, n, "PMIX_RANK and Slurm's number of tasks"),
                 None => {
                     return Err(format!(
@@ -186,6 +188,8 @@ mod tests {
                 ],
                 "5/8",
             ),
+            // A program that has initialised MPI by itself.
+            (&[("PMIX_RANK", "0"), ("PMIX_NAMESPACE", "1")], "whole"),
             // Arrays.
             (
                 &[

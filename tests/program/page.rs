@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// Two bodies of two colours, the taller of which darkens the other's top.
+/// Two bodies of two colours, one of which is nearer to the eye and darkens what the other shows beside it.
 const PIPELINE: &str = "name: cubes
 stages:
   - scene:
       objects:
-        - {name: red, color: [0.9, 0.1, 0.1], box: {min: [-0.8, -0.5, -0.5, -0.3], max: [-0.05, 0.5, 0.5, 0.3]}}
-        - {name: blue, color: [0.1, 0.2, 0.9], box: {min: [0.05, -0.5, -0.5, -0.3], max: [0.8, 0.9, 0.5, 0.3]}}
+        - {name: red, color: [0.9, 0.1, 0.1], box: {min: [-0.8, -0.5, -0.5, -0.3], max: [-0.05, 0.5, 0.5, 0.3], subdivisions: 8}}
+        - {name: blue, color: [0.1, 0.2, 0.9], box: {min: [0.05, -0.5, -0.5, -0.3], max: [0.8, 0.9, 0.5, 0.9]}}
   - occlusion: {samples: 16, file: ao.f32}
   - render: {id: both, camera: {fit: true, projection: parallel}, dimensions: [24, 24, 24], shading: smooth}
   - animate: {id: turn, frames: 4, turn: {plane: xw}, vti: turn.vti}
