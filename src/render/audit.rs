@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 
 use super::NOTHING;
 use super::gbuffer::{Columns, GBuffer};
+use super::inside::inside;
 use crate::geometry::{Dimension, Vector};
 use crate::occlusion::{Error, Estimator};
 use crate::progress::{Progress, Uncounted};
@@ -116,8 +117,10 @@ impl<const D: usize> Audit<D> {
     /// # Errors
     /// If `progress` says so, or a device fails.
     pub fn finish(self, backend: &dyn RayBackend<D>, progress: &dyn Progress) -> Result<Option<Accuracy>, Error> {
+        let mesh = backend.tracer().mesh();
         let point = |checked: Checked<D>| {
             let Checked { number, simplex, position, normal, shown } = checked;
+            let position = inside(mesh, simplex, &position);
             (ShadingPoint::Inside { position, normal, simplex, number }, shown)
         };
         let (points, shown): (Vec<_>, Vec<f32>) = self.chosen.into_values().map(point).unzip();

@@ -23,7 +23,7 @@ use super::samples::Group;
 use super::surface::{Hit, SurfacePass, facing};
 use super::visibility::Passages;
 use super::{Columns, Shading};
-use crate::geometry::{Cone, normal_of, widen};
+use crate::geometry::{Cone, Vector64, narrow, normal_of, widen};
 use crate::occlusion::{Error, Estimator};
 use crate::progress::{Progress, Uncounted};
 use crate::trace::{RayBackend, ShadingPoint};
@@ -165,11 +165,14 @@ impl<const D: usize> Behind<'_, D> {
 
     /// A shading point in this layer of a voxel.
     fn point(&self, hit: &Hit<D>, index: [usize; 3], layer: usize) -> ShadingPoint<D> {
-        let corners = self.pass.tracer.mesh().corners(hit.simplex).map(|v| widen(&v));
+        let mesh = self.pass.tracer.mesh();
+        let corners = mesh.corners(hit.simplex).map(|v| widen(&v));
+        let weights = hit.crossing.barycentric;
+        let position = (0..D).fold(Vector64::zeros(), |p, c| p + corners[c] * weights[c]);
         let grid = &self.pass.sampling.grid;
         let voxel = index[0] + grid.dimensions[0] * (index[1] + grid.dimensions[1] * index[2]);
         ShadingPoint::Inside {
-            position: inside(&corners, &hit.crossing.barycentric),
+            position: inside(mesh, hit.simplex, &narrow(&position)),
             normal: facing(normal_of(&corners), &hit.ray),
             simplex: hit.simplex,
             number: (layer * grid.len() + voxel) as u64,

@@ -5,7 +5,8 @@
 //! with the image's symmetry, single voxels come out dark. So a point near its simplex's border is moved inwards, by more
 //! than rounding can move it out, and by far less than a voxel.
 
-use crate::geometry::{Vector, Vector64, narrow};
+use crate::geometry::{Vector, Vector64, narrow, widen};
+use crate::mesh::Mesh;
 
 /// How many steps of the coordinates a point keeps from its simplex's facets. Of the rays that would start behind a neighbour those
 /// below a slope of one in so many still do.
@@ -14,23 +15,35 @@ const STEPS: f64 = 256.0 * f32::EPSILON as f64;
 /// The most that a barycentric coordinate is raised to, in simplices that are hardly larger than steps of their coordinates.
 const MOST: f64 = 0.125;
 
-/// The point of a simplex with these barycentric coordinates, or one beside it that is farther from all facets.
-pub(super) fn inside<const D: usize>(corners: &[Vector64<D>; D], barycentric: &[f64; D]) -> Vector<D> {
-    let mut weights = *barycentric;
-    if barycentric.iter().any(|&weight| weight < MOST) {
-        let room = STEPS * corners.iter().map(|corner| corner.amax()).fold(0.0, f64::max);
-        for corner in (0..D).filter(|&corner| barycentric[corner] < MOST) {
-            // A barycentric coordinate is the height over the facet, as a share of the corner's.
-            weights[corner] = weights[corner].max(MOST.min(room / height(corners, corner)));
-        }
-        let sum: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|weight| *weight /= sum);
-    }
-    narrow(&(0..D).fold(Vector64::zeros(), |point, c| point + corners[c] * weights[c]))
+/// A visible point of a simplex, or one beside it that is farther from all facets.
+pub(super) fn inside<const D: usize>(mesh: &Mesh<D>, simplex: u32, position: &Vector<D>) -> Vector<D> {
+    moved(&mesh.corners(simplex).map(|corner| widen(&corner)), position)
 }
 
-/// How far a corner is from the facet of the others; 0 or close to it in flat simplices.
-fn height<const D: usize>(corners: &[Vector64<D>; D], corner: usize) -> f64 {
+fn moved<const D: usize>(corners: &[Vector64<D>; D], position: &Vector<D>) -> Vector<D> {
+    let (mut weights, mut is_moved) = ([0.0; D], false);
+    let room = STEPS * corners.iter().map(|corner| corner.amax()).fold(0.0, f64::max);
+    let point = widen(position);
+    for corner in 0..D {
+        // A barycentric coordinate is the height over the facet, as a share of the corner's.
+        let across = across(corners, corner);
+        let height = across.norm();
+        let least = MOST.min(room / height);
+        let weight = across.dot(&(point - corners[(corner + 1) % D])) / (height * height);
+        // Nothing is known of it in a simplex without extent.
+        let is_far = weight >= least || !weight.is_finite();
+        is_moved |= !is_far;
+        weights[corner] = if weight.is_finite() { weight.max(least) } else { least };
+    }
+    if !is_moved {
+        return *position;
+    }
+    let sum: f64 = weights.iter().sum();
+    narrow(&(0..D).fold(Vector64::zeros(), |point, c| point + corners[c] * (weights[c] / sum)))
+}
+
+/// What leads from the facet of the others to a corner, at right angles; 0 or close to it in flat simplices.
+fn across<const D: usize>(corners: &[Vector64<D>; D], corner: usize) -> Vector64<D> {
     let base = corners[(corner + 1) % D];
     let mut across = corners[corner] - base;
     let mut axes = [Vector64::<D>::zeros(); D];
@@ -40,13 +53,12 @@ fn height<const D: usize>(corners: &[Vector64<D>; D], corner: usize) -> f64 {
         axes[next] = axis.try_normalize(0.0).unwrap_or_else(Vector64::zeros);
         across -= axes[next] * axes[next].dot(&across);
     }
-    across.norm()
+    across
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::widen;
 
     fn corners<const D: usize>(scale: f64) -> [Vector64<D>; D] {
         std::array::from_fn(|c| Vector64::from_fn(|k, _| if k == c { 3.0 * scale } else { scale }))
@@ -60,18 +72,14 @@ mod tests {
     fn points_keep_away_from_facets_and_stay_where_they_are_inside<const D: usize>() {
         for scale in [1e-20, 1.0, 1e20] {
             let corners = corners::<D>(scale);
-            let mut barycentric = [0.0; D];
-            barycentric[0] = 1.0;
-            let moved = weights(&inside(&corners, &barycentric), scale);
-            let height = height(&corners, 1) / scale;
-            for (k, weight) in moved.iter().enumerate().skip(1) {
+            let found = weights(&moved(&corners, &narrow(&corners[0])), scale);
+            let height = across(&corners, 1).norm() / scale;
+            for (k, weight) in found.iter().enumerate().skip(1) {
                 let steps = weight * height / f64::from(f32::EPSILON) / 3.0;
                 assert!((200.0..300.0).contains(&steps), "{D}D, {scale}, {k}: {steps}");
             }
-            let middle = [1.0 / D as f64; D];
-            let kept = widen(&inside(&corners, &middle));
-            let expected = Vector64::<D>::repeat(scale * (1.0 + 2.0 / D as f64));
-            assert!((kept - expected).amax() < 1e-6 * scale);
+            let middle = narrow(&Vector64::<D>::repeat(scale * (1.0 + 2.0 / D as f64)));
+            assert_eq!(moved(&corners, &middle), middle);
         }
     }
 
@@ -84,10 +92,10 @@ mod tests {
     #[test]
     fn flat_and_tiny_simplices_give_points_between_their_corners() {
         let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]].map(Vector64::<3>::from);
-        let found = inside(&flat, &[0.0, 1.0, 0.0]);
+        let found = moved(&flat, &narrow(&flat[1]));
         assert!(found[1] == 0.0 && found[2] == 0.0 && (0.5..1.5).contains(&found[0]), "{found}");
         let tiny = [[1.0, 0.0, 0.0], [1.0 + 1e-7, 0.0, 0.0], [1.0, 1e-7, 0.0]].map(Vector64::<3>::from);
-        let found = inside(&tiny, &[1.0, 0.0, 0.0]);
+        let found = moved(&tiny, &narrow(&tiny[0]));
         assert!((f64::from(found[0]) - 1.0).abs() < 2e-7 && (0.0..1e-7).contains(&f64::from(found[1])), "{found}");
     }
 }

@@ -13,7 +13,7 @@ use super::surface::facing;
 use super::visibility::Passages;
 use super::{Camera, Shading, Visibility};
 use crate::accel::Passage;
-use crate::geometry::{Cone, Crossing, Ray, Vector, normal_of, widen};
+use crate::geometry::{Cone, Crossing, Ray, Vector, Vector64, narrow, normal_of, widen};
 use crate::mesh::Mesh;
 use crate::occlusion::Error;
 use crate::progress::{Progress, Uncounted};
@@ -102,8 +102,10 @@ impl<const D: usize> LayerPass<'_, D> {
                 let simplex = passage.simplex;
                 let (ray, crossing) = self.crossing(first + voxel, simplex);
                 let corners = self.mesh().corners(simplex).map(|v| widen(&v));
+                let weights = crossing.barycentric;
+                let position = (0..D).fold(Vector64::zeros(), |p, c| p + corners[c] * weights[c]);
                 ShadingPoint::Inside {
-                    position: inside(&corners, &crossing.barycentric),
+                    position: inside(self.mesh(), simplex, &narrow(&position)),
                     normal: facing(normal_of(&corners), &ray),
                     simplex,
                     // Those of the first layer have the rays that the picture's own points have.

@@ -24,6 +24,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::inside::inside;
 use super::tone::to_linear;
 use crate::accel::Tracer;
 use crate::geometry::{Ray, Vector, Vector64, narrow, normal_of, widen};
@@ -83,7 +84,7 @@ pub struct DepthCue {
 pub(super) struct Lit<const D: usize> {
     /// The simplex it is inside of.
     pub simplex: u32,
-    pub point: Vector<D>,
+    pub point: Vector64<D>,
     /// The simplex's unit normal on the side that is seen.
     pub facing: Vector64<D>,
     /// The unit normal that cosines are taken with.
@@ -119,12 +120,13 @@ impl<const D: usize> Lighting<D> {
         let specular = lit.gloss.specular.unwrap_or(self.specular);
         let shininess = lit.gloss.shininess.unwrap_or(self.shininess);
         for (light, reached) in self.lights.iter().zip(&self.reached) {
-            let Some((towards, distance)) = light.source.from(&widen(&lit.point)) else { continue };
+            let point = narrow(&lit.point);
+            let Some((towards, distance)) = light.source.from(&widen(&point)) else { continue };
             let cosine = lit.normal.dot(&towards);
             if cosine <= 0.0 || lit.facing.dot(&towards) <= 0.0 {
                 continue;
             }
-            let arriving = arriving(tracer, lit.point, lit.simplex, towards, distance);
+            let arriving = arriving(tracer, inside(tracer.mesh(), lit.simplex, &point), lit.simplex, towards, distance);
             if arriving == 0.0 {
                 continue;
             }

@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use super::gbuffer::{Columns, GBuffer};
+use super::inside::inside;
 use super::{NOTHING, Skylight};
+use crate::mesh::Mesh;
 use crate::occlusion::{Directional, Error, Estimates, Estimator};
 use crate::progress::Progress;
 use crate::trace::{RayBackend, ShadingPoint};
@@ -42,7 +44,7 @@ pub(super) fn occlude_and_light<const D: usize>(
         return occlude(backend, estimator, buffer, progress);
     }
     let seen = seen(buffer);
-    let points = points(buffer, &seen);
+    let points = points(backend.tracer().mesh(), buffer, &seen);
     let is_lit = buffer.columns().intersects(Columns::HIDDEN | Columns::BOUNCE_ERROR);
     let radiosity = skylight.and_then(|skylight| skylight.radiosity.as_ref()).filter(|_| is_lit);
     let found = estimator.directional(backend, &points, radiosity.map(|r| r.as_slice()), progress);
@@ -96,16 +98,16 @@ pub(super) fn at<const D: usize>(
     places: &[usize],
     progress: &dyn Progress,
 ) -> Result<Estimates, Error> {
-    let points = points(buffer, places);
+    let points = points(backend.tracer().mesh(), buffer, places);
     let found = estimator.estimate(backend, &points, None, progress);
     found.map_err(|error| error.placed(|place| voxel(buffer, places[place])))
 }
 
 /// The points that these voxels show.
-fn points<const D: usize>(buffer: &GBuffer<D>, places: &[usize]) -> Vec<ShadingPoint<D>> {
+fn points<const D: usize>(mesh: &Mesh<D>, buffer: &GBuffer<D>, places: &[usize]) -> Vec<ShadingPoint<D>> {
     let first = buffer.layers().start * buffer.layer_len();
     let point = |&i: &usize| ShadingPoint::Inside {
-        position: buffer.position[i],
+        position: inside(mesh, buffer.simplex[i], &buffer.position[i]),
         normal: buffer.normal[i],
         simplex: buffer.simplex[i],
         number: (first + i) as u64,

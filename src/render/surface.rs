@@ -12,7 +12,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use super::gbuffer::{Columns, GBuffer, RowMut};
-use super::inside::inside;
 use super::light::{Lighting, Lit, reflectance};
 use super::samples::{Group, Sampling};
 use super::{Camera, Shading, Skylight, Visibility, audit};
@@ -142,7 +141,7 @@ impl<const D: usize> SurfacePass<'_, D> {
         let weights = scratch.cone(self.tracer, simplex, &ray.origin).crossing(&ray.direction).barycentric;
         let vertices = mesh.simplices[simplex as usize];
         set(out.barycentric, i, || weights.map(|w| w as f32));
-        set(out.position, i, || inside(&corners, &weights));
+        set(out.position, i, || narrow(&(0..D).fold(Vector64::zeros(), |p, c| p + corners[c] * weights[c])));
         set(out.shading_normal, i, || {
             let normal = |c: usize| widen(&mesh.normals[vertices[c] as usize]);
             facing((0..D).fold(Vector64::zeros(), |n, c| n + normal(c) * weights[c]), &ray)
@@ -257,7 +256,7 @@ impl<const D: usize> SurfacePass<'_, D> {
         let side = interpolated.dot(&facing);
         Lit {
             simplex: hit.simplex,
-            point: inside(&corners, &weights),
+            point: (0..D).fold(Vector64::zeros(), |p, c| p + corners[c] * weights[c]),
             facing,
             normal: if side == 0.0 { facing } else { interpolated * side.signum() },
             to_eye: widen(&unit(&-widen(&hit.ray.direction))),

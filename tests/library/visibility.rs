@@ -423,7 +423,7 @@ fn the_cheaper_way_is_chosen() {
     // An eye among many small ones, some of which reach behind it.
     let fine = mesh(&object::<4>(json!({"hypersphere": {"radius": 1.0, "subdivisions": 10}})));
     assert_eq!(pick(&fine, 0.3, [96, 96, 96]), Method::Rasterize);
-    // Two thousand tetrahedra, each of which covers much.
-    let soup = mesh(&Random(1).soup::<4>(2000, 2.0, false));
-    assert_eq!(pick(&soup, 3.6, [16, 16, 16]), Method::RayCast);
+    // Four thousand tetrahedra, each of which covers much.
+    let soup = mesh(&Random(1).soup::<4>(4000, 2.0, false));
+    assert_eq!(pick(&soup, 3.6, [12, 12, 12]), Method::RayCast);
 }
