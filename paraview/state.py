@@ -514,8 +514,9 @@ def finish_tubes(shown):
         bar, size = GetScalarBar(GetColorTransferFunction(array), v), text_size()
         setp(bar, Title=array, ComponentTitle='', TitleColor=TEXT, LabelColor=TEXT, TitleFontFamily='Arial',
              LabelFontFamily='Arial', TitleFontSize=size, LabelFontSize=int(0.85 * size), AutomaticLabelFormat=0,
-             HorizontalTitle=1, LabelFormat='%.2f', RangeLabelFormat='%.2f', UseCustomLabels=1, CustomLabels=[(low + high) / 2],
-             ScalarBarThickness=int(0.6 * size), ScalarBarLength=0.25, Orientation='Vertical')
+             HorizontalTitle=1, LabelFormat='%.2f', RangeLabelFormat='%.2f', UseCustomLabels=1,
+             CustomLabels=[(low + high) / 2], ScalarBarThickness=int(0.6 * size), ScalarBarLength=0.25,
+             Orientation='Vertical')
         for place in ('Any Location', 'AnyLocation'):
             try:
                 bar.WindowLocation = place
@@ -541,7 +542,7 @@ def show_edges(panel, box, v, aspect):
 
 
 def show_slices_alone(panel, v, aspect):
-    """Surfaces that lie in one space. Several have a colour each, and are cut open as CUT says: that shows what is within."""
+    """Surfaces that lie in one space. Several have a colour each, and are cut open as CUT says to show the inside."""
     readers = [read_polydata(name) for name in panel['files']]
     filled = [(k, reader) for k, reader in enumerate(readers) if is_filled(reader)]
     light_view(v)

@@ -99,7 +99,7 @@ fn keys_and_types() {
     for (from, to, message) in [
         ("samples:", "^sampels:", format!("stages[1].occlusion.sampels: unknown key, did you mean `samples`? {occlusion_keys}")),
         ("seed: 1", "^sed: 1", "sed: unknown key, did you mean `seed`? (known: name, seed, stages, program, folder, variables, include, sweep, inputs)".into()),
-        ("- occlusion:", "- ^oclusion:", "stages[1].oclusion: unknown key, did you mean `occlusion`? (known: scene, occlusion, render, write, paraview, mesh, slice, wireframe, animate, shade)".into()),
+        ("- occlusion:", "- ^oclusion:", "stages[1].oclusion: unknown key, did you mean `occlusion`? (known: scene, occlusion, render, write, paraview, mesh, slice, wireframe, animate, shade, page)".into()),
         ("id: image", "shading: ^smoth", "stages[2].render.shading: unknown value `smoth`, did you mean `smooth`? (known: smooth, flat, voxel, auto)".into()),
         ("samples: 16", "samples: ^many", "stages[1].occlusion.samples: expected a whole number, 0 or above, found the text \"many\"".into()),
         ("samples: 16", "samples: ^-16", "stages[1].occlusion.samples: expected a whole number, 0 or above, found the number -16".into()),

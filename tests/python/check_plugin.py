@@ -44,7 +44,8 @@ def update(proxy, when=None):
 
 def arrays(proxy):
     data = dsa.WrapDataObject(servermanager.Fetch(proxy)).PointData
-    return {name: [float(x) for x in data[name].reshape(-1)[:: max(1, data[name].size // 1000)]] for name in data.keys()}
+    # JSON has no infinity, which is the depth of nothing.
+    return {name: [float(x) if abs(x) < 1e30 else -1.0 for x in data[name].reshape(-1)[:: max(1, data[name].size // 1000)]] for name in data.keys()}
 
 
 def told(read=[0]):
