@@ -4,7 +4,7 @@
 //! degrees: the image then lies in the hyperplane through the origin and covers -1 to 1 (thesis 4.6.1). `up` and
 //! `over` only have to be independent of the line of sight and of each other; the renderer makes them orthogonal.
 //!
-//! `camera: fit`, or `fit: true` beside other keys, leaves to the program where the eye is: [`super::fit`] finds it once the
+//! `camera: fit`, or `fit: true` beside other keys, leaves to the program where the eye is: `stages/fit.rs` finds it once the
 //! scene is known, and puts the camera that it finds in the place of the words.
 
 use std::fmt;

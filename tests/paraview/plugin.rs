@@ -43,8 +43,14 @@ fn some(path: &Path, name: &str) -> Vec<f64> {
     values.into_iter().step_by(step).map(|x| if x.abs() < 1e30 { x } else { -1.0 }).collect()
 }
 
+/// Numbers in single precision, as the files have them: decimal digits on the way may cost the last bit of more.
 fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap_or_else(|| panic!("{value}")).iter().map(|n| n.as_f64().unwrap()).collect()
+    value
+        .as_array()
+        .unwrap_or_else(|| panic!("{value}"))
+        .iter()
+        .map(|n| f64::from(n.as_f64().unwrap() as f32))
+        .collect()
 }
 
 fn texts(value: &Value) -> Vec<&str> {

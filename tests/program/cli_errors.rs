@@ -105,7 +105,7 @@ fn keys_and_types() {
         ("samples: 16", "samples: ^-16", "stages[1].occlusion.samples: expected a whole number, 0 or above, found the number -16".into()),
         ("samples: 16", "samples: ^1.5", "stages[1].occlusion.samples: expected a whole number, 0 or above, found the number 1.5".into()),
         ("[4, 4, 4]", "", "p.yaml:13:17: stages[2].render.dimensions: expected a list, found nothing".into()),
-        ("dimensions:", "camera:", "p.yaml:13:15: stages[2].render.camera: expected a mapping (of projection, eye, target, field_of_view, height, up, over), found a list of 3".into()),
+        ("dimensions:", "camera:", "p.yaml:13:15: stages[2].render.camera: expected the word `fit`, or a mapping such as {eye: [0, 0, 0, 2]}, found a list".into()),
         ("      dimensions: [4, 4, 4]\n", "", "p.yaml:12:7: stages[2].render: the key `dimensions` is missing".into()),
         ("seed: 1", "seed: ^99999999999999999999", "seed: the number 1e20 is too large".into()),
         ("[[0, 0, 0, -1]", "[[^.nan, 0, 0, -1]", "stages[0].scene.objects[0].simplices.vertices[0][0]: expected a finite number, found an infinite one or not a number (NaN)".into()),

@@ -1,7 +1,7 @@
 //! A page: one HTML file with volumes in it and the program that shows them, for anybody with a browser.
 //!
 //! Nothing is fetched: style, program and pictures stand in the file, and its security policy forbids everything else. A
-//! picture's voxels are packed ([`pack`]) and written in base64, a line a frame, so that the browser unpacks only those
+//! picture's voxels are packed (`pack`) and written in base64, a line a frame, so that the browser unpacks only those
 //! that are looked at. `page.js` unpacks them and draws: it is the other half of this module.
 
 mod pack;

@@ -1,6 +1,6 @@
 //! `wireframe`: edges of a scene's bodies as a render's camera sees them (Noll 1967), as lines beside its volume.
 //!
-//! What lies behind the eye is cut off a little before it, and each line tells whether something hides it ([`lines`]). Or the
+//! What lies behind the eye is cut off a little before it, and each line tells whether something hides it (`lines`). Or the
 //! edges are projected stereographically, from what lies around a centre, without a camera. Which edges are shown is told in
 //! [`crate::mesh::edges`].
 
