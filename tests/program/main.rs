@@ -5,6 +5,7 @@ mod cli_help;
 mod cli_random;
 mod cli_run;
 mod cli_schema;
+mod documents;
 mod hostile;
 mod inspect;
 mod page;

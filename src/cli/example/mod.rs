@@ -99,12 +99,19 @@ fn schema() -> Result<Vec<u8>, Failure> {
 /// Characters of what a list says of an example.
 const LONGEST: usize = 90;
 
-/// What an example shows: the beginning of the comment that opens it.
+/// What those of the thesis begin with; their names say it too.
+const THESIS: &str = "Djami, Ambient Occlusion in 4D (2021), ";
+
+/// What an example shows: the first sentence of the comment that opens it.
 fn about(text: &str) -> String {
     let comment: Vec<&str> = text.lines().map_while(|line| line.strip_prefix('#')).map(str::trim).collect();
     let comment = comment.join(" ");
-    let end = [". ", ": ", "; "].iter().filter_map(|mark| comment.find(mark)).min().unwrap_or(comment.len());
-    let first = comment[..end].trim_end_matches('.');
+    let comment = comment.trim_start_matches(THESIS);
+    let mut ends = comment.match_indices([';', '.']).map(|(at, _)| at);
+    let is_end = |&at: &usize| {
+        comment[at + 1..].starts_with(' ') && !comment[..at].ends_with("Fig") && !comment[..at].ends_with("Figs")
+    };
+    let first = comment[..ends.find(is_end).unwrap_or(comment.len())].trim_end_matches('.');
     match first.char_indices().nth(LONGEST) {
         None => first.to_owned(),
         Some((end, _)) => format!("{} ...", first[..end].rsplit_once(' ').map_or(first, |(words, _)| words)),
