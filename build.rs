@@ -4,9 +4,15 @@
 use std::path::Path;
 use std::process::Command;
 
+/// What `cargo package` writes into a package.
+const PACKAGED: &str = ".cargo_vcs_info.json";
+
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-changed=.cargo_vcs_info.json");
+    // A file that isn't there counts as changed, and everything would be compiled again and again.
+    if Path::new(PACKAGED).exists() {
+        println!("cargo:rerun-if-changed={PACKAGED}");
+    }
     let commit =
         packaged().or_else(|| if std::env::var("PROFILE").as_deref() == Ok("release") { checked_out() } else { None });
     if let Some(commit) = commit {
@@ -16,7 +22,7 @@ fn main() {
 
 /// The commit that `cargo package` wrote down.
 fn packaged() -> Option<String> {
-    let text = std::fs::read_to_string(".cargo_vcs_info.json").ok()?;
+    let text = std::fs::read_to_string(PACKAGED).ok()?;
     let after = text.split("\"sha1\"").nth(1)?;
     let hash = after.split('"').nth(1)?;
     hash.chars().all(|c| c.is_ascii_hexdigit()).then(|| hash.chars().take(12).collect())
@@ -39,6 +45,6 @@ fn checked_out() -> Option<String> {
             println!("cargo:rerun-if-changed={path}");
         }
     }
-    let changed = git(&["status", "--porcelain", "--untracked-files=no"]).map_or("", |_| " with changes");
+    let changed = git(&["--no-optional-locks", "status", "--porcelain", "--untracked-files=no"]).map_or("", |_| " with changes");
     Some(git(&["rev-parse", "--short=12", "HEAD"])? + changed)
 }
