@@ -45,6 +45,7 @@ fn checked_out() -> Option<String> {
             println!("cargo:rerun-if-changed={path}");
         }
     }
-    let changed = git(&["--no-optional-locks", "status", "--porcelain", "--untracked-files=no"]).map_or("", |_| " with changes");
+    let changed =
+        git(&["--no-optional-locks", "status", "--porcelain", "--untracked-files=no"]).map_or("", |_| " with changes");
     Some(git(&["rev-parse", "--short=12", "HEAD"])? + changed)
 }
