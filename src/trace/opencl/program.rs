@@ -34,7 +34,8 @@ pub(super) struct Shape {
 /// The text for this. In one piece, as some wrappers and drivers can't take more, and without comments, which some compilers
 /// don't take either.
 pub(super) fn text(shape: Shape, double: bool) -> String {
-    let (depth, pieces) = (shape.depth.max(1), if shape.piece.is_some() { PIECES } else { 1 });
+    // By steps, so that what was compiled for one mesh serves most others.
+    let (depth, pieces) = (shape.depth.max(1).next_multiple_of(4), if shape.piece.is_some() { PIECES } else { 1 });
     let mut text = format!(
         "#define D {}\n#define DEPTH {depth}\n#define PIECES {pieces}\n#define PIECE {}u\n#define GROUP {GROUP}\n\
          #define LOWEST_SQUARED_COSINE {LOWEST_SQUARED_COSINE:e}f\n",
