@@ -99,7 +99,7 @@ impl<const D: usize> Tracer<D> {
         }
         let near =
             |bounds: &Aabb<D>| (0..D).all(|k| bounds.min[k] - room <= point[k] && point[k] <= bounds.max[k] + room);
-        self.bvh().within(near, |simplex| visit(simplex));
+        self.bvh().within(near, visit);
     }
 
     /// The binary hierarchy; made when first asked for, on one thread.
