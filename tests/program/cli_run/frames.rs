@@ -51,11 +51,12 @@ fn a_stage_tells_its_numbers_and_its_own_time() {
     let detail = scene["detail"].as_str().unwrap().replace(',', "");
     assert_eq!(detail, format!("{vertices} vertices {} simplices", scene["numbers"]["simplices"]));
     // The render had these values computed; their time is told here all the same.
-    assert_eq!(occlusion["numbers"]["rays"], 64 * vertices, "{occlusion}");
+    let rays = occlusion["numbers"]["rays"].as_u64().unwrap();
+    assert!(rays > 0 && rays % 64 == 0 && rays <= 64 * vertices, "of the vertices that are seen: {occlusion}");
     assert!(occlusion["numbers"]["error"].as_f64().unwrap() > 0.0);
     let seconds = |stage: &Value| stage["seconds"].as_f64().unwrap();
     let speed = occlusion["numbers"]["rays_per_second"].as_f64().unwrap();
-    assert!((seconds(occlusion) * speed / (64 * vertices) as f64 - 1.0).abs() < 0.01, "{occlusion}");
+    assert!((seconds(occlusion) * speed / rays as f64 - 1.0).abs() < 0.01, "{occlusion}");
     assert!(seconds(scene) + seconds(occlusion) + seconds(render) <= report["seconds"].as_f64().unwrap());
     assert_eq!((&render["numbers"]["voxels"], &write["numbers"]), (&512.into(), &serde_json::json!({})));
     let seen = render["numbers"]["seen"].as_u64().unwrap();
