@@ -21,7 +21,7 @@ use super::scene::ScenePlan;
 use super::slice::SlicePlan;
 use super::wireframe::WireframePlan;
 use super::write::{Format, PROGRAM, WritePlan, write_whole};
-use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError};
+use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError, Told};
 use crate::geometry::Dimension;
 use crate::io::paraview;
 use crate::render::Aov;
@@ -355,11 +355,11 @@ impl Stage for FigurePlan {
     }
 
     /// Writes the state, if it isn't there already.
-    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
+    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<Told, StageError> {
         let (plan, figure) = (run.plan, &run.plan[me]);
         // Of pieces the first shows the parts of all, where parts are listed.
         if plan.piece.is_some_and(|piece| piece.index() > 0 || !figure.has_parts()) {
-            return Ok("made when the pieces are joined".to_owned());
+            return Ok("made when the pieces are joined".into());
         }
         let state = state(plan, figure)?;
         let path = plan.out.join(&figure.state);
@@ -369,7 +369,7 @@ impl Stage for FigurePlan {
         }
         let bytes = state.len() as u64;
         run.ledger.record(Made { file: &figure.state, bytes, notes: Vec::new(), named: true, unchanged })?;
-        Ok(String::new())
+        Ok(Told::default())
     }
 }
 

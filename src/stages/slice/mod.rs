@@ -26,7 +26,7 @@ use super::projection::{ProjectionWord, StereographicPlan};
 use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
 use super::write::vtu;
-use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told};
 use crate::geometry::Dimension;
 use crate::io::{self, AtomicFile, pvd};
 use crate::mesh::section::section;
@@ -183,7 +183,7 @@ impl Stage for SlicePlan {
         format!("{} {with}, {}, {places}{shown} -> {}", plan.id(*scene), level.line(), file.display())
     }
 
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         let Self { occlusion, level: cut, stereographic, places, files, list, .. } = &plan[me];
         let stale: Vec<usize> = (0..files.len()).filter(|&i| run.is_stale(&files[i])).collect();
@@ -237,7 +237,10 @@ impl Stage for SlicePlan {
             Dimension::Three => "lines",
             Dimension::Four => "triangles",
         };
-        Ok(if stale.is_empty() { "as it was".to_owned() } else { format!("{faces} {what}") })
+        Ok(match stale.is_empty() {
+            true => "as it was".into(),
+            false => Told::new(format!("{faces} {what}"), json!({ what: faces })),
+        })
     }
 }
 

@@ -38,6 +38,32 @@ fn details(folder: &Folder, arguments: &[&str]) -> Vec<(String, String)> {
     report["stages"].as_array().unwrap().iter().map(|s| (text(&s["stage"]), text(&s["detail"]))).collect()
 }
 
+#[test]
+fn a_stage_tells_its_numbers_and_its_own_time() {
+    let folder = Folder::with(
+        "name: p\nstages:\n  - scene: {objects: [{tesseract: {size: 1, subdivisions: 4}}]}\n  - occlusion: {samples: 64}\n  - render: \
+         {dimensions: [8, 8, 8], camera: {eye: [0, 0, 0, 2]}}\n  - write: {vti: a.vti}\n",
+    );
+    let output = folder.run(&["--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let [scene, occlusion, render, write] = &report["stages"].as_array().unwrap()[..] else { panic!("{report}") };
+    let vertices = scene["numbers"]["vertices"].as_u64().unwrap();
+    let detail = scene["detail"].as_str().unwrap().replace(',', "");
+    assert_eq!(detail, format!("{vertices} vertices {} simplices", scene["numbers"]["simplices"]));
+    // The render had these values computed; their time is told here all the same.
+    let rays = occlusion["numbers"]["rays"].as_u64().unwrap();
+    assert!(rays > 0 && rays % 64 == 0 && rays <= 64 * vertices, "of the vertices that are seen: {occlusion}");
+    assert!(occlusion["numbers"]["error"].as_f64().unwrap() > 0.0);
+    let seconds = |stage: &Value| stage["seconds"].as_f64().unwrap();
+    let speed = occlusion["numbers"]["rays_per_second"].as_f64().unwrap();
+    assert!((seconds(occlusion) * speed / rays as f64 - 1.0).abs() < 0.01, "{occlusion}");
+    assert!(seconds(scene) + seconds(occlusion) + seconds(render) <= report["seconds"].as_f64().unwrap());
+    assert_eq!((&render["numbers"]["voxels"], &write["numbers"]), (&512.into(), &serde_json::json!({})));
+    let seen = render["numbers"]["seen"].as_u64().unwrap();
+    assert!(render["detail"].as_str().unwrap().starts_with(&format!("{seen} of 512 voxels")) && seen > 0, "{render}");
+    assert!(render["numbers"]["off"]["rms"].is_f64(), "{render}");
+}
+
 /// The number before the word `rays` in the detail of a stage.
 fn rays(details: &[(String, String)], stage: &str) -> u64 {
     let detail = &details.iter().find(|(name, _)| name == stage).unwrap().1;
