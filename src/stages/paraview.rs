@@ -460,7 +460,8 @@ fn with_twins(writes: Vec<Shown>, resolver: &Resolver) -> Vec<Shown> {
         let twin = match shown {
             Shown::Image(_) => Shown::Image(plan.reference(index)?),
             Shown::Animation(_) => Shown::Animation(plan.reference(index)?),
-            Shown::Wireframe(_) | Shown::Slice(_) => return None,
+            Shown::Wireframe(_) => Shown::Wireframe(plan.reference(index)?),
+            Shown::Slice(_) => return None,
         };
         (!writes.contains(&twin)).then_some(twin)
     };
@@ -516,7 +517,10 @@ fn edges(
         resolver.warn(path, "has no use where no edges are drawn");
         return Ok(None);
     }
-    let flat = |w: &Ref<WireframePlan>| plan[plan[*w].scene].dimension == Dimension::Three;
+    // Twins have no w, and are drawn in one colour then.
+    let flat = |w: &Ref<WireframePlan>| {
+        plan[plan[*w].scene].dimension == Dimension::Three && !plan.is_twin(w.index())
+    };
     if given.color_by == Some(EdgeColor::W)
         && let Some(wireframe) = drawn.iter().find(|w| flat(w))
     {
@@ -693,7 +697,9 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
         let fits = |wireframe: &Ref<WireframePlan>| {
             matches!(write, Shown::Image(_)) && plan[*wireframe].render().is_some_and(|render| Some(render) == view)
         };
-        let edges = over.filter(fits).map(|wireframe| beside(&figure.state, &plan[wireframe].file));
+        let twin = over.and_then(|over| plan.reference(plan.twin_of(over.index())?));
+        let edges = [over, twin].into_iter().flatten().find(fits);
+        let edges = edges.map(|wireframe| beside(&figure.state, &plan[wireframe].file));
         panels.push(paraview::Panel { kind, files, caption, grid, edges });
     }
     Ok(paraview::state(&paraview::Figure {
