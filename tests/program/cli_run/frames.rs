@@ -234,6 +234,10 @@ fn what_cannot_be_animated_is_refused() {
     let unused = figures.run(&["--set", "f.input=turn", "--set", "f.slices=play"]);
     let told = String::from_utf8_lossy(&unused.stderr).into_owned();
     assert!(told.contains("slices: has no use where no sequence of slices is shown"), "{told}");
+    // Two bodies, which the file doesn't tell apart.
+    let blurred = figures.run(&["--set", "f.input=turn", "--set", "turn.arrays=[rgba, opacity]"]);
+    let told = String::from_utf8_lossy(&blurred.stderr).into_owned();
+    assert!(told.contains("paraview: shows `turn`, whose arrays lack `object`: its bodies share one skin"), "{told}");
     // 14 bytes a voxel, as the figure wants objects told apart, in each of 10,000 frames: told before anything is computed.
     let told = format!("out/film: {} bytes are to be written, and the disk has ", 14u64 * 10_000 * 1000 * 1000 * 1000);
     folder.fails(&["--set", "turn.frames=10000", "--set", "image.dimensions=[1000, 1000, 1000]"], 3, &[&told]);
