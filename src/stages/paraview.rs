@@ -518,9 +518,7 @@ fn edges(
         return Ok(None);
     }
     // Twins have no w, and are drawn in one colour then.
-    let flat = |w: &Ref<WireframePlan>| {
-        plan[plan[*w].scene].dimension == Dimension::Three && !plan.is_twin(w.index())
-    };
+    let flat = |w: &Ref<WireframePlan>| plan[plan[*w].scene].dimension == Dimension::Three && !plan.is_twin(w.index());
     if given.color_by == Some(EdgeColor::W)
         && let Some(wireframe) = drawn.iter().find(|w| flat(w))
     {

@@ -651,13 +651,8 @@ fn a_sequence_of_slices_is_played() {
     let times = vec![-0.5, 0.25, 1.0];
     let list = fs::File::create(folder.path().join("s.pvd")).unwrap();
     ao4d::io::pvd::write(list, times.iter().copied().zip(names)).unwrap();
-    let panel = Panel {
-        kind: Kind::Slices,
-        files: vec!["s.pvd".into()],
-        caption: String::new(),
-        grid: None,
-        edges: None,
-    };
+    let panel =
+        Panel { kind: Kind::Slices, files: vec!["s.pvd".into()], caption: String::new(), grid: None, edges: None };
     let film = Some(ao4d::io::paraview::Film { frames: 3, rate: 8.0, times: Some(times) });
     let cut = Cut::Octant { corner: None };
     let figure = Figure { film, cut, panels: vec![panel], size: Some([600, 500]), ..surface(&[]) };

@@ -86,11 +86,14 @@ fn a_twin_is_what_one_would_write_by_hand() {
     }
     // Edges are drawn over each image and beside it.
     let text = state("edges.py");
-    let found: Vec<usize> = ["image-3d.vti', 'caption': 'image 3d', 'edges': 'edges-3d.vtp'", "image.vti', 'caption': 'image', 'edges': 'edges.vtp'"]
-        .into_iter()
-        .chain(["'edges', 'file': 'edges-3d.vtp'", "'edges', 'file': 'edges.vtp'"])
-        .map(|panel| text.find(panel).unwrap_or_else(|| panic!("{panel}: {text:.3000}")))
-        .collect();
+    let found: Vec<usize> = [
+        "image-3d.vti', 'caption': 'image 3d', 'edges': 'edges-3d.vtp'",
+        "image.vti', 'caption': 'image', 'edges': 'edges.vtp'",
+    ]
+    .into_iter()
+    .chain(["'edges', 'file': 'edges-3d.vtp'", "'edges', 'file': 'edges.vtp'"])
+    .map(|panel| text.find(panel).unwrap_or_else(|| panic!("{panel}: {text:.3000}")))
+    .collect();
     assert!(found.is_sorted(), "{found:?}");
     // A second run has nothing to do, and one without the twin leaves the 4D files as they are.
     assert_eq!(folder.runs(&[]).0, Vec::<String>::new());
