@@ -646,7 +646,8 @@ fn a_sequence_of_slices_is_played() {
     }
     let empty = r#"<?xml version="1.0"?>
 <VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"><PolyData>
-<Piece NumberOfPoints="0" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="0"/></PolyData></VTKFile>"#;
+<Piece NumberOfPoints="0" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="0">
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii"></DataArray></Points></Piece></PolyData></VTKFile>"#;
     fs::write(folder.path().join(names[0]), empty).unwrap();
     let times = vec![-0.5, 0.25, 1.0];
     let list = fs::File::create(folder.path().join("s.pvd")).unwrap();
