@@ -459,12 +459,12 @@ fn join<const D: usize>(
     let grid = render.grid(plan)?;
     let audit = render.audit(plan).map(Audit::<D>::new);
     let made = write::join(me, joined, run, (&grid, scene.session.mesh_hash()), audit, |audit| {
-        Ok(audit.finish(&**scene.session.backend()?, run.progress)?)
+        Ok(audit.finish(&**scene.session.backend(), run.progress)?)
     })?;
     running.end();
     let mut notes: Vec<String> = from_behind(plan.id(me), made.behind, made.seen).into_iter().collect();
     if made.seen == 0 && !scene.session.mesh().simplices.is_empty() {
-        let picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, Shaded::None)?;
+        let picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, Shaded::None);
         notes.push(format!("{name} shows background only: {}", nothing_seen(&picture)));
     }
     for (file, bytes) in made.files {

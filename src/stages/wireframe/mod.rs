@@ -230,7 +230,7 @@ impl Stage for WireframePlan {
                 let mut lines = Lines::seen(mesh, &camera, *near, &edges);
                 if *hidden != Hidden::Ignore && !lines.lines.is_empty() {
                     let voxel = camera.grid(*dimensions).spacing[1];
-                    let backend = scene.session.backend()?;
+                    let backend = scene.session.backend();
                     lines.look(&**backend, &camera, voxel, *hidden == Hidden::LeaveOut, run.progress)?;
                 }
                 lines
