@@ -192,7 +192,7 @@ impl Stage for SlicePlan {
         }
         let values = occlusion.and_then(|occlusion| scene.values.get(&occlusion)).map(|values| &**values);
         let mesh = scene.session.mesh();
-        let mut faces = 0;
+        let (mut faces, mut met) = (0, false);
         for &i in &stale {
             let file = &files[i];
             let shown = match stereographic {
@@ -212,8 +212,12 @@ impl Stage for SlicePlan {
             };
             faces += found.faces.len();
             let mut notes = Vec::new();
-            if found.faces.is_empty() && list.is_none() {
+            met |= !found.faces.is_empty();
+            // Of a sequence some may go past; where all do, the last one tells.
+            let all = !met && stale.len() == files.len() && i + 1 == files.len();
+            if found.faces.is_empty() && (list.is_none() || all) {
                 let what = match cut {
+                    LevelPlan::Across(_) | LevelPlan::W if all => "no hyperplane meets anything; all files are empty",
                     LevelPlan::Across(_) | LevelPlan::W => "the hyperplane meets nothing; the file is empty",
                     LevelPlan::Hopf { .. } => {
                         "the torus meets nothing; the file is empty. Is `center` within the body?"

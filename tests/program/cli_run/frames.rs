@@ -234,6 +234,36 @@ fn what_cannot_be_animated_is_refused() {
     ] {
         folder.fails(&["--set", set], 2, &[words]);
     }
+    // Sequences of slices are played with others like them, not with films.
+    let slices = "  - slice: {id: one, range: [-1, 0], count: 3, vtp: one.vtp}
+  - slice: {id: two, range: [-1, 0], count: 4, vtp: two.vtp}
+  - animate: {id: turn, frames: 3, turn: {plane: xw, to: 40}, vti: turn.vti}
+  - paraview: {id: f, input: [one, two], slices: together, state: f.py, screenshot: f.png}
+";
+    let figures = film(slices);
+    for (input, words) in [
+        ("[one, two]", "they need the same `range` and `count`: `two` has others than the one before it"),
+        ("[turn, one]", "`one` can't be played here: an animation has a time in seconds, and slices have their places"),
+        ("[one, turn]", "`turn` can't be played here"),
+    ] {
+        let set = format!("f.input={input}");
+        figures.fails(&["--set", &set, "--set", "f.slices=play"], 2, &[words]);
+    }
+    let together = figures.run(&["--set", "f.input=[turn, one, two]"]);
+    assert_eq!(together.status.code(), Some(0), "{}", String::from_utf8_lossy(&together.stderr));
+    let played = figures.run(&["--set", "f.input=two", "--set", "f.slices=play"]);
+    assert_eq!(played.status.code(), Some(0), "{}", String::from_utf8_lossy(&played.stderr));
+    let state = std::fs::read_to_string(figures.path("out/film/f.py")).unwrap();
+    let panel = "{'kind': 'slices', 'file': 'two.pvd', 'files': ['two.pvd'], 'caption': ''}";
+    let times = "TIMES = [-1.0, -0.6666666666666667, -0.33333333333333337, 0.0]";
+    assert!(state.contains(panel) && state.contains(times) && state.contains("FRAMES = 4"), "{state:.3000}");
+    let unused = figures.run(&["--set", "f.input=turn", "--set", "f.slices=play"]);
+    let told = String::from_utf8_lossy(&unused.stderr).into_owned();
+    assert!(told.contains("slices: has no use where no sequence of slices is shown"), "{told}");
+    // Two bodies, which the file doesn't tell apart.
+    let blurred = figures.run(&["--set", "f.input=turn", "--set", "turn.arrays=[rgba, opacity]"]);
+    let told = String::from_utf8_lossy(&blurred.stderr).into_owned();
+    assert!(told.contains("paraview: shows `turn`, whose arrays lack `object`: its bodies share one skin"), "{told}");
     // 14 bytes a voxel, as the figure wants objects told apart, in each of 10,000 frames: told before anything is computed.
     let told = format!("out/film: {} bytes are to be written, and the disk has ", 14u64 * 10_000 * 1000 * 1000 * 1000);
     folder.fails(&["--set", "turn.frames=10000", "--set", "image.dimensions=[1000, 1000, 1000]"], 3, &[&told]);
