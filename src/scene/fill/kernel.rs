@@ -48,13 +48,7 @@ pub fn deepest(planes: &[Plane], center: &Vector64<3>, radius: f64, least: f64) 
 /// The point within these planes where depth and tilt together are largest; nothing if no point is as deep as `least`, and none if the
 /// method goes round in circles.
 #[expect(clippy::option_option, reason = "either there is no such point, or it isn't known")]
-fn tilted(
-    planes: &[Plane],
-    center: &Vector64<3>,
-    radius: f64,
-    least: f64,
-    tilt: f64,
-) -> Option<Option<Deepest>> {
+fn tilted(planes: &[Plane], center: &Vector64<3>, radius: f64, least: f64, tilt: f64) -> Option<Option<Deepest>> {
     // A regular tetrahedron around the ball to begin with: its directions add up to zero.
     let s = 1.0 / 3f64.sqrt();
     let around = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
