@@ -13,6 +13,7 @@ use super::range::Short;
 use crate::geometry::{Vector64, is_degenerate, narrow};
 use crate::io::mesh::{Cells, FileMesh, PointArray, simplices};
 use crate::io::vtk::UnstructuredGrid;
+use crate::mesh::crossings;
 use crate::mesh::identity::identities;
 use crate::mesh::topology::{
     components, corners, enclosed_volume, f_vector, facet_pairs, singular_vertices, surface_measure, worst_quality,
@@ -20,6 +21,9 @@ use crate::mesh::topology::{
 
 /// Beyond this coordinates are refused by scenes.
 const LARGEST: f64 = 1e30;
+
+/// The most triangles that are looked at to see whether they pass through each other.
+const MOST_CROSSED: usize = 100_000;
 
 /// What the simplices make up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -72,6 +76,9 @@ pub struct SurfaceSummary {
     pub measure: f64,
     /// What a closed, oriented surface encloses; negative if its normals point inwards.
     pub enclosed_volume: Option<f64>,
+    /// Where a closed surface in 3D passes through itself, in words; null also for those of more than 100,000 triangles, which nobody
+    /// looks at.
+    pub crossing: Option<String>,
     /// The worst simplex's shape: 1 if regular, 0 if flat.
     pub worst_quality: Option<f64>,
     /// Which one that is.
@@ -118,13 +125,14 @@ impl SurfaceSummary {
         let f_vector = f_vector(&welded);
         let singular = singular_vertices(&welded);
         let worst = worst_quality(corners(points, simplices));
+        let closed = pairs.open == 0 && pairs.unbalanced == pairs.misoriented;
         Some(Self {
             form,
             euler_characteristic: f_vector.iter().rev().fold(0, |sum, &n| n as i64 - sum),
             f_vector,
             components: components(&welded),
             // What doesn't cancel may only be neighbours that disagree.
-            closed: pairs.open == 0 && pairs.unbalanced == pairs.misoriented,
+            closed,
             oriented: pairs.misoriented == 0,
             manifold: pairs.crowded == 0 && singular == 0,
             welded: identity.iter().enumerate().all(|(i, &v)| i == v as usize),
@@ -137,10 +145,21 @@ impl SurfaceSummary {
             degenerate_simplices: (simplices.iter()).filter(|s| is_degenerate(&s.map(|v| rounded[v as usize]))).count(),
             measure: surface_measure(corners(points, simplices)),
             enclosed_volume: pairs.is_closed().then(|| enclosed_volume(corners(points, simplices))),
+            crossing: if closed { crossing(points, &welded) } else { None },
             worst_quality: worst.map(|(_, quality)| quality),
             worst_simplex: worst.map(|(simplex, _)| simplex),
         })
     }
+}
+
+/// Where a closed surface passes through itself, if it is one in 3D and not too large to look.
+fn crossing<const D: usize>(points: &[Vector64<D>], simplices: &[[u32; D]]) -> Option<String> {
+    if D != 3 || simplices.len() > MOST_CROSSED {
+        return None;
+    }
+    let points: Vec<Vector64<3>> = points.iter().map(|p| Vector64::from([p[0], p[1], p[2]])).collect();
+    let triangles: Vec<[u32; 3]> = simplices.iter().map(|s| [s[0], s[1], s[2]]).collect();
+    crossings::told(&points, &triangles)
 }
 
 /// The points' coordinates from the array `position`, if there is one of D components.
@@ -174,6 +193,9 @@ impl fmt::Display for SurfaceSummary {
             (0, 1) => writeln!(f, "  not manifold: it touches itself at 1 vertex")?,
             (0, n) => writeln!(f, "  not manifold: it touches itself at {n} vertices")?,
             (n, _) => writeln!(f, "  not manifold: {} with more than two neighbours", many(n, facet))?,
+        }
+        if let Some(crossing) = &self.crossing {
+            writeln!(f, "  {crossing}")?;
         }
         match self.duplicate_points {
             0 => writeln!(f, "  welded")?,

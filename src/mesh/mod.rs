@@ -12,6 +12,7 @@
 //! - [`normals`]: measure-weighted vertex normals;
 //! - [`rounding`]: which simplices turn over when rounded;
 //! - [`corners`]: where the surface creases, and vertices are split so that each side has a normal of its own;
+//! - [`crossings`]: where a closed surface passes through itself;
 //! - simplices of measure zero, which no ray can hit.
 //!
 //! What is made of a mesh for the eye: cross-sections ([`section`]), peels of hyperspheres ([`peel`]) and wireframes
@@ -21,6 +22,7 @@ mod approach;
 mod build;
 pub mod copies;
 pub mod corners;
+pub mod crossings;
 pub mod edges;
 mod error;
 pub mod facets;

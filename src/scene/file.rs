@@ -13,7 +13,12 @@ use super::welding::Weld;
 use crate::geometry::{Dimension, Vector64};
 use crate::io::Input;
 use crate::io::mesh::Cells;
-use crate::mesh::Surface;
+use crate::mesh::topology::facet_pairs;
+use crate::mesh::weld::weld as welded;
+use crate::mesh::{Surface, crossings};
+
+/// The most triangles that are looked at to see whether they pass through each other: more would cost more than reading them.
+const MOST_CROSSED: usize = 10_000;
 
 /// The surface that the file holds.
 pub fn build<const D: usize>(
@@ -52,13 +57,30 @@ pub fn build<const D: usize>(
             return Err(input.wrong(message).into());
         }
     };
-    if !weld.wanted() {
-        return Ok(Surface { vertices, simplices, normals });
+    let mut surface = Surface { vertices, simplices, normals };
+    if weld.wanted() {
+        let (kept, simplices) = weld.kept(&surface.vertices, surface.simplices, notes)?;
+        let vertices = kept.iter().map(|&i| surface.vertices[i as usize]).collect();
+        let normals = surface.normals.map(|normals| kept.iter().map(|&i| normals[i as usize]).collect());
+        surface = Surface { vertices, simplices, normals };
     }
-    let (kept, simplices) = weld.kept(&vertices, simplices, notes)?;
-    let vertices = kept.iter().map(|&i| vertices[i as usize]).collect();
-    let normals = normals.map(|normals| kept.iter().map(|&i| normals[i as usize]).collect());
-    Ok(Surface { vertices, simplices, normals })
+    notes.extend(crossing(&surface).map(|crossing| input.wrong(crossing).to_string()));
+    Ok(surface)
+}
+
+/// Where a closed surface in 3D passes through itself, in words, if it is not too large to look.
+fn crossing<const D: usize>(surface: &Surface<D>) -> Option<String> {
+    if D != 3 || surface.simplices.len() > MOST_CROSSED {
+        return None;
+    }
+    let points: Vec<Vector64<3>> = surface.vertices.iter().map(|p| Vector64::from([p[0], p[1], p[2]])).collect();
+    let triangles: Vec<[u32; 3]> = surface.simplices.iter().map(|s| [s[0], s[1], s[2]]).collect();
+    let (points, triangles) = welded(&points, triangles);
+    let closed = facet_pairs(&triangles).is_closed();
+    let crossing = if closed { crossings::told(&points, &triangles) } else { None };
+    crossing.map(|crossing| {
+        format!("{crossing}; what is inside another body is dark: unite them in the program that made them if that isn't wanted")
+    })
 }
 
 /// The simplices, if N is D.

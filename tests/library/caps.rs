@@ -41,18 +41,24 @@ fn capped(surface: &Surface<3>) -> Result<Surface<4>, String> {
 
 /// Checks the body swept from a surface, and tells how many tetrahedra and points it has.
 fn check(name: &str, surface: &Surface<3>) -> (usize, usize) {
+    check_within(name, surface, 1e-11)
+}
+
+/// The same, with volumes within a tolerance: where rounding has moved corners of a flat face out of its plane, other triangles over the
+/// same corners enclose a little more or less.
+fn check_within(name: &str, surface: &Surface<3>, tolerance: f64) -> (usize, usize) {
     let body = capped(surface).unwrap_or_else(|error| panic!("{name}: {error}"));
     let pairs = facet_pairs(&body.simplices);
     assert!(pairs.is_closed() && pairs.open == 0, "{name}: {pairs:?}");
     let solid = volume(surface).abs();
-    assert!((volume(&body) / (2.0 * solid) - 1.0).abs() < 1e-11, "{name}: {} {}", volume(&body), 2.0 * solid);
+    assert!((volume(&body) / (2.0 * solid) - 1.0).abs() < tolerance, "{name}: {} {}", volume(&body), 2.0 * solid);
     // No part of a cap twice: the sizes of its tetrahedra, all counted as positive, make up the solid.
     for end in [-1.0, 1.0] {
         let cap: f64 = corners(&body.vertices, &body.simplices)
             .filter(|simplex| simplex.iter().all(|v| v[3] == end))
             .map(|simplex| measure(&simplex))
             .sum();
-        assert!((cap / solid - 1.0).abs() < 1e-11, "{name}: {cap} {solid}");
+        assert!((cap / solid - 1.0).abs() < tolerance, "{name}: {cap} {solid}");
         // Its own vertices are all there.
         let mut there: Vec<[u64; 3]> =
             body.vertices.iter().filter(|v| v[3] == end).map(|v| [0, 1, 2].map(|i| (v[i] + 0.0).to_bits())).collect();
@@ -153,6 +159,20 @@ fn bodies_that_overlap_are_told_by_place() {
     assert!(notes.len() == 1 && notes[0].starts_with("extrude.mesh: "), "{notes:?}");
     assert!(notes[0].contains("passes through itself, or has bodies that overlap: the triangle"), "{notes:?}");
     assert_eq!(told(1.0), [""; 0], "those that touch at a corner");
+    // As a surface in 3D, too; vertices apart are welded to see it, and an open one encloses nothing.
+    let told = |low: f64, left_out: usize| {
+        let mut surface = together(cube(0.0, 1.0, 2), &cube(low, 1.5, 1));
+        surface.simplices.truncate(surface.simplices.len() - left_out);
+        std::fs::write(folder.path().join("x.obj"), text(&surface)).unwrap();
+        let mut notes = Vec::new();
+        let spec: ObjectSpec = serde_json::from_value(json!({"file": "x.obj"})).unwrap();
+        build_object_with_notes::<3>(&spec, folder.path(), &mut notes).unwrap();
+        notes
+    };
+    let notes = told(0.6, 0);
+    assert!(notes.len() == 1 && notes[0].starts_with("file: "), "{notes:?}");
+    assert!(notes[0].contains("passes through itself, or has bodies that overlap: the triangle"), "{notes:?}");
+    assert_eq!((told(1.0, 0), told(0.6, 1)), (vec![], vec![]));
 }
 
 #[test]
@@ -303,7 +323,8 @@ fn parts_with_flat_faces_take_few_pieces() {
     ] {
         for degrees in [0.0, 20.0, 133.0] {
             let surface = askew(surface.clone(), degrees, degrees / 50.0);
-            let (tetrahedra, _) = check(&format!("{name} {degrees}"), &surface);
+            let tolerance = if degrees == 0.0 && name != "frame" && name != "gear" { 1e-11 } else { 1e-6 };
+            let (tetrahedra, _) = check_within(&format!("{name} {degrees}"), &surface, tolerance);
             assert!(turned_over(&capped(&surface).unwrap()).is_empty());
             let filling = (tetrahedra - 3 * surface.simplices.len()) / 2;
             assert!(
@@ -311,6 +332,44 @@ fn parts_with_flat_faces_take_few_pieces() {
                 "{name} {degrees}: {filling} of {}",
                 surface.simplices.len()
             );
+        }
+    }
+}
+
+#[test]
+fn faces_cut_by_ear_clipping_take_few_pieces() {
+    // A gear with a round hole and a slit, so that each end is one polygon; the reader cuts it by ear clipping.
+    let folder = tempfile::tempdir().unwrap();
+    for (teeth, most) in [(20, 6), (60, 6)] {
+        let (outer, inner) = (4 * teeth, 2 * teeth);
+        let at = |i: u32, count: u32| std::f64::consts::TAU * 0.99 * f64::from(i) / f64::from(count - 1);
+        let mut outline: Vec<[f64; 2]> = Vec::new();
+        outline.extend((0..outer).map(|i| {
+            let radius = if i % 4 < 2 { 0.85 } else { 1.0 };
+            [radius * libm::cos(at(i, outer)), radius * libm::sin(at(i, outer))]
+        }));
+        outline.extend((0..inner).rev().map(|i| [libm::cos(at(i, inner)), libm::sin(at(i, inner))].map(|x| 0.3 * x)));
+        let count = outline.len();
+        let mut obj = String::new();
+        for z in [0.0, 0.3] {
+            outline.iter().for_each(|[x, y]| writeln!(obj, "v {x} {y} {z}").unwrap());
+        }
+        let face = |corners: Vec<usize>| corners.iter().map(|i| format!(" {}", i + 1)).collect::<String>();
+        writeln!(obj, "f{}\nf{}", face((0..count).rev().collect()), face((count..2 * count).collect())).unwrap();
+        for i in 0..count {
+            let j = (i + 1) % count;
+            writeln!(obj, "f{}", face(vec![i, j, j + count, i + count])).unwrap();
+        }
+        std::fs::write(folder.path().join("gear.obj"), obj).unwrap();
+        let surface: Surface<3> = build(json!({"file": "gear.obj"}), folder.path()).unwrap();
+        assert_eq!(surface.simplices.len(), 2 * (count - 2) + 2 * count);
+        for degrees in [0.0, 20.0] {
+            let surface = askew(surface.clone(), degrees, degrees / 50.0);
+            let name = format!("{teeth} teeth, {degrees} degrees");
+            let (tetrahedra, _) = check_within(&name, &surface, 1e-6);
+            assert!(turned_over(&capped(&surface).unwrap()).is_empty(), "{name}");
+            let (filling, count) = ((tetrahedra - 3 * surface.simplices.len()) / 2, surface.simplices.len());
+            assert!(filling <= most * count, "{name}: {filling} of {count}");
         }
     }
 }

@@ -229,6 +229,16 @@ fn nrrd_data_where_it_is() {
     good("end.nhdr");
     write("long.nhdr", &format!("{usual}data file: long.bin"), b"");
     is_refused(at, json!({"file": "long.nhdr"}), &["long.bin", "10432 bytes", "10080", "byte skip"]);
+    // Packed, its length shows only at the end.
+    for (name, more) in [("exact", 0), ("more", 2)] {
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut packed, &[content.clone(), vec![0; more]].concat()).unwrap();
+        std::fs::write(at.join(format!("{name}.gz")), packed.finish().unwrap()).unwrap();
+        let header = format!("NRRD0005\nendian: little\n{usual}encoding: gzip\ndata file: {name}.gz\n");
+        std::fs::write(at.join(format!("{name}.nhdr")), header).unwrap();
+    }
+    good("exact.nhdr");
+    is_refused(at, json!({"file": "more.nhdr"}), &["more.nhdr", "a data file holds more values than"]);
     for (i, frame) in content.chunks(2016).enumerate() {
         std::fs::write(at.join(format!("t{:02}.bin", i + 1)), frame).unwrap();
     }
@@ -458,6 +468,10 @@ fn netcdf_axes_by_name_and_attribute() {
         write(&netcdf(version, &named, &[field(&[0, 1, 2, 3], [3, 2, 1, 0])]));
         is_placed(at, json!({"file": "a.nc"}), 0.0, [1.0; 4], [0.0; 4]);
     }
+    // As a weather model names them.
+    let named = [("west_east", 9), ("south_north", 8), ("bottom_top", 7), ("Time", 5)];
+    write(&netcdf(1, &named, &[field(&[1, 3, 0, 2], [2, 0, 3, 1])]));
+    is_placed(at, json!({"file": "a.nc"}), 0.0, [1.0; 4], [0.0; 4]);
     // By attributes of coordinates, whose names say nothing; latitudes go down.
     let unnamed = [("a", 9), ("b", 8), ("c", 7), ("d", 5)];
     let text = |key: &'static str, value: &str| (key, 2, value.as_bytes().to_vec());
@@ -560,6 +574,10 @@ fn netcdf_numbers_by_their_conventions() {
         big(&odd),
     );
     assert_eq!(missing(0.0), 4);
+    // What should be a number, but isn't, is told.
+    write(5, vec![("scale_factor", 2, b"0.5".to_vec())], big(&values(USUAL)));
+    let (_, notes) = try_build::<4>(at, json!({"file": "a.nc"}), 0.0).unwrap();
+    assert!(notes.iter().any(|note| note.contains("its attribute scale_factor is the text \"0.5\"")), "{notes:?}");
     // Scale and offset, with limits of the numbers as they are stored.
     let stored: Vec<u8> = values(USUAL).iter().flat_map(|v| ((v * 1000.0) as i16).to_be_bytes()).collect();
     let scaled = vec![

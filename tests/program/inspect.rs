@@ -291,6 +291,24 @@ fn surfaces_are_told_apart() {
     let flat = folder.surface("flat.ply");
     assert_eq!((flat.degenerate_simplices, flat.worst_quality, flat.unused_points), (1, Some(0.0), 2));
 
+    // Two bodies, apart or one into the other.
+    for (shift, crosses) in [(1.5, false), (0.1, true)] {
+        let points: Vec<String> = (0..8)
+            .map(|i| {
+                let at = |axis: usize| f64::from(u8::from(i % 4 == axis + 1)) + if i < 4 { 0.0 } else { shift };
+                format!("{} {} {}", at(0), at(1), at(2))
+            })
+            .collect();
+        let points: Vec<&str> = points.iter().map(String::as_str).collect();
+        let one = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        folder.write("two.ply", &ply(&points, &[one, one.map(|t| t.map(|i| i + 4))].concat()));
+        let two = folder.surface("two.ply");
+        assert_eq!((two.closed, two.crossing.is_some()), (true, crosses), "{two:?}");
+        let told =
+            folder.says(&["info", "two.ply"]).1.contains("passes through itself, or has bodies that overlap: the");
+        assert_eq!(told, crosses);
+    }
+
     // The same body with the points of each triangle for itself is closed all the same, but not welded.
     folder.write("loose.ply", &loose(&[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]));
     let loose = folder.surface("loose.ply");

@@ -49,6 +49,8 @@ impl Role {
             | "xc"
             | "nx"
             | "rlon"
+            | "west_east"
+            | "west_east_stag"
             | "projection_x_coordinate"
             | "grid_longitude" => Role::X,
             "y"
@@ -58,10 +60,12 @@ impl Role {
             | "yc"
             | "ny"
             | "rlat"
+            | "south_north"
+            | "south_north_stag"
             | "projection_y_coordinate"
             | "grid_latitude" => Role::Y,
             "z" | "lev" | "level" | "levels" | "depth" | "height" | "altitude" | "plev" | "elevation" | "zc" | "nz"
-            | "slice" | "slices" | "air_pressure" => Role::Z,
+            | "slice" | "slices" | "air_pressure" | "bottom_top" | "bottom_top_stag" => Role::Z,
             "t" | "time" | "times" | "frame" | "frames" | "nt" | "timepoint" | "date" | "step" => Role::Time,
             "c" | "s" | "channel" | "channels" | "component" | "components" | "band" | "bands" | "wavelength"
             | "sample" | "samples" | "member" | "ensemble" | "realization" => Role::Channel,

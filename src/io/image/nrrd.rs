@@ -229,7 +229,8 @@ fn values(
         return Ok(Box::new(Words::new(BufReader::new(stream(file, *start, packing)?))));
     }
     let inner = if packing == Packing::Gzip { bytes as u64 } else { 0 };
-    let parts = Parts { parts: parts.into_iter(), packing, inner, each, current: None };
+    let whole = packing == Packing::Gzip && files.iter().all(|file| file != path);
+    let parts = Parts { parts: parts.into_iter(), packing, inner, each, whole, current: None };
     Ok(Box::new(Bytes::new(Box::new(parts), kind, little_endian, Meaning::default())))
 }
 
@@ -256,6 +257,8 @@ struct Parts {
     inner: u64,
     /// Bytes of each.
     each: u64,
+    /// Whether nothing may follow them.
+    whole: bool,
     current: Option<(Box<dyn Stream>, u64)>,
 }
 
@@ -274,10 +277,16 @@ impl Parts {
 
 impl Read for Parts {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        let whole = self.whole;
         let Some((file, left)) = self.current()? else { return Ok(0) };
         let most = bytes.len().min(usize::try_from(*left).unwrap_or(usize::MAX));
         let count = file.read(&mut bytes[..most])?;
         *left -= count as u64;
+        if whole && *left == 0 && count > 0 && file.read(&mut [0])? > 0 {
+            return Err(std::io::Error::other(
+                "a data file holds more values than the sizes and type make: they don't fit",
+            ));
+        }
         Ok(count)
     }
 }

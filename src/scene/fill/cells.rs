@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 
 use super::LEAST;
 use super::complex::{Complex, Side};
-use super::crossings::solid_angle;
 use super::kernel::Plane;
 use crate::geometry::Vector64;
 use crate::mesh::UnionFind;
+use crate::mesh::crossings::solid_angle;
 
 /// The parts of a cell that no face connects, each with its cavities; a cell with a cavity in nothing stays whole.
 ///

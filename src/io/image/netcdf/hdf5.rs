@@ -72,7 +72,14 @@ impl Hdf5 {
 
 /// What the crate says.
 fn told(error: Error) -> String {
-    format!("its HDF5 can't be read: {error}")
+    match error.to_string() {
+        filter if filter.starts_with("unsupported filter") => {
+            format!(
+                "unsupported: it is packed by a filter of its own ({filter}); convert it: h5repack -f GZIP=4 IN OUT"
+            )
+        }
+        error => format!("its HDF5 can't be read: {error}"),
+    }
 }
 
 /// All data sets, with their paths.

@@ -62,6 +62,11 @@ pub(super) fn open(path: &Path, length: u64, request: &Request) -> Result<Opened
     opened.has_times =
         opened.axes.iter().any(|a| a.role == Some(Role::Time) && matches!(a.positions, Positions::Listed(_)));
     opened.unit = variable.text("units").map(str::to_owned);
+    for name in ["scale_factor", "add_offset", "_FillValue", "missing_value", "valid_min", "valid_max", "valid_range"] {
+        if let Some(text) = variable.text(name) {
+            notes.push(format!("its attribute {name} is the text \"{text}\", not a number, and is not heeded"));
+        }
+    }
     opened.notes = notes;
     Ok(opened)
 }

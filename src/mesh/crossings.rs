@@ -6,19 +6,40 @@
 
 use std::f64::consts::PI;
 
-use super::LEAST;
+use super::UnionFind;
 use crate::geometry::Vector64;
-use crate::mesh::UnionFind;
 
-/// How far an edge must pass through a triangle to both sides.
-const THROUGH: f64 = 4.0 * LEAST;
+/// How far an edge must pass through a triangle to both sides, in a surface of about size 1: some steps of single precision.
+const THROUGH: f64 = 4e-6;
 
 /// The most triangles looked at to see what is inside what.
 const MOST_LOOKS: usize = 100_000_000;
 
+/// Where a closed surface of any size passes through itself, in words; none if it doesn't.
+pub fn told(points: &[Vector64<3>], triangles: &[[u32; 3]]) -> Option<String> {
+    let used = || triangles.as_flattened().iter().map(|&i| points[i as usize]);
+    let first = used().next()?;
+    let [low, high] = used().fold([first; 2], |[low, high], p| [low.inf(&p), high.sup(&p)]);
+    let (center, size) = ((low + high) / 2.0, (high - low).amax() / 2.0);
+    if !size.is_normal() {
+        return None;
+    }
+    let near: Vec<Vector64<3>> = points.iter().map(|point| (point - center) / size).collect();
+    let [one, other] = crossing(&near, triangles)?;
+    let place = |i: usize| {
+        let middle = triangles[i].iter().map(|&corner| points[corner as usize]).sum::<Vector64<3>>() / 3.0;
+        middle.iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", ")
+    };
+    let how = match one == other {
+        true => format!("the triangle at ({}) is inside a body that the rest of its own is not inside", place(one)),
+        false => format!("the triangles at ({}) and at ({})", place(one), place(other)),
+    };
+    Some(format!("passes through itself, or has bodies that overlap: {how}"))
+}
+
 /// Two triangles of a surface of about size 1 that pass through each other, or one inside a body that is not wholly inside, twice;
 /// none if there are none.
-pub fn crossing(points: &[Vector64<3>], triangles: &[[u32; 3]]) -> Option<[usize; 2]> {
+fn crossing(points: &[Vector64<3>], triangles: &[[u32; 3]]) -> Option<[usize; 2]> {
     let corners: Vec<[Vector64<3>; 3]> = triangles.iter().map(|t| t.map(|i| points[i as usize])).collect();
     let boxes: Vec<[Vector64<3>; 2]> = corners.iter().map(|[a, b, c]| [a.inf(b).inf(c), a.sup(b).sup(c)]).collect();
     pierced(&corners, &boxes).or_else(|| astride(points.len(), triangles, &corners, &boxes))
