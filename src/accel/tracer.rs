@@ -92,7 +92,7 @@ impl<const D: usize> Tracer<D> {
     }
 
     /// Calls `visit` for all simplices, and maybe some others, whose boxes are within `room` of the point on each axis.
-    pub(super) fn around(&self, point: &Vector<D>, room: f32, mut visit: impl FnMut(u32)) {
+    pub(super) fn around(&self, point: &Vector<D>, room: f32, visit: impl FnMut(u32)) {
         if let Some(wide) = self.wide.get().filter(|wide| wide.is_whole() && wide.serves(point)) {
             wide.around(point, room, visit);
             return;
