@@ -24,11 +24,14 @@ def page(schema):
         rows = table(definition, defs)
         about = flat(definition.get("description", ""))
         parts.append(f"## {title}\n\n<a id=\"{name.lower()}\"></a>{about}\n\n{rows}")
-        open_.extend(name for name in referred(definition) if is_shown(defs, name))
+        open_.extend(sections(definition, defs))
 
-    for one in defs["StageSpec"]["oneOf"]:
-        (kind, inner), = one["properties"].items()
+    kinds = [next(iter(one["properties"].items())) for one in defs["StageSpec"]["oneOf"]]
+    links = ", ".join(f"[`{kind}`](#{target(inner).lower()})" for kind, inner in kinds)
+    parts.append(f'<a id="stagespec"></a>A stage is a mapping with one key, its kind: {links}.\n')
+    for kind, inner in kinds:
         section(f"`{kind}`", target(inner))
+    open_.extend(name for name in sections(schema["properties"], defs) if name != "StageSpec")
     while open_:
         name = open_.pop(0)
         section(title_of(name, schema), name)
@@ -38,9 +41,9 @@ def page(schema):
 def title_of(name, schema):
     """What is written before a mapping of this kind: the keys that take it."""
     keys = []
-    for definition in schema["$defs"].values():
+    for definition in [*schema["$defs"].values(), schema]:
         for key, value in keys_of(definition).items():
-            if name in referred(value) and key not in keys:
+            if name in sections(value, schema["$defs"]) and key not in keys:
                 keys.append(key)
     return ", ".join(f"`{key}`" for key in keys) or name
 
@@ -48,6 +51,17 @@ def title_of(name, schema):
 def is_shown(defs, name):
     """Whether a definition has keys, and so a section of its own."""
     return bool(defs[name].get("properties")) or any("properties" in one for one in defs[name].get("oneOf", []))
+
+
+def sections(value, defs, within=()):
+    """The definitions with sections of their own that a value refers to, also by those that have none."""
+    found = []
+    for name in referred(value):
+        if is_shown(defs, name):
+            found.append(name)
+        elif name not in within:
+            found += sections(defs[name], defs, (*within, name))
+    return found
 
 
 def target(value):

@@ -1,12 +1,19 @@
 /* What host and device share. src/trace/opencl/layout.rs has the same structs, and asks `layout` below whether it
    is so. Coordinates are those of the mesh times a power of two that makes the scene about 1 wide. In 3D w is 0. */
 
+/* Up to eight boxes, of children that are nodes and then of those that are leaves. On each axis a box goes from origin + low *
+   2^(exponent - 127) to origin + high * 2^(exponent - 127), one byte each for low, high and exponent. */
 typedef struct {
-    float4 low;
-    float4 high;
-    uint first; /* the first simplex of a leaf, or the left one of two neighbouring children */
-    uint count; /* simplices of a leaf; 0 for an inner node */
-    uint padding[2];
+    float4 origin;
+    uint exponents;  /* of the axes, the first in the lowest byte */
+    uint children;   /* the first child that is a node; the others follow it */
+    uint simplices;  /* the first simplex of the leaves */
+    uint inner;      /* how many children are nodes */
+    uint2 leaves;    /* a byte a child; of a leaf 8 * (its first simplex, counted from `simplices`) + how many it has */
+    uint filled;     /* how many children there are */
+    uint padding;
+    uint2 low[4];    /* of each axis, a byte a child */
+    uint2 high[4];
 } Node;
 
 typedef struct {
@@ -39,11 +46,12 @@ __kernel void layout(__global uint *sizes) {
     Point point;
     StarCone cone;
     sizes[0] = sizeof(Node);
-    sizes[1] = (uint)((uintptr_t)&node.first - (uintptr_t)&node);
-    sizes[2] = sizeof(Point);
-    sizes[3] = (uint)((uintptr_t)&point.keys - (uintptr_t)&point);
-    sizes[4] = (uint)((uintptr_t)&point.factor - (uintptr_t)&point);
-    sizes[5] = (uint)((uintptr_t)&point.next - (uintptr_t)&point);
-    sizes[6] = sizeof(StarCone);
-    sizes[7] = (uint)((uintptr_t)&cone.bounds - (uintptr_t)&cone);
+    sizes[1] = (uint)((uintptr_t)&node.leaves - (uintptr_t)&node);
+    sizes[2] = (uint)((uintptr_t)&node.high - (uintptr_t)&node);
+    sizes[3] = sizeof(Point);
+    sizes[4] = (uint)((uintptr_t)&point.keys - (uintptr_t)&point);
+    sizes[5] = (uint)((uintptr_t)&point.factor - (uintptr_t)&point);
+    sizes[6] = (uint)((uintptr_t)&point.next - (uintptr_t)&point);
+    sizes[7] = sizeof(StarCone);
+    sizes[8] = (uint)((uintptr_t)&cone.bounds - (uintptr_t)&cone);
 }

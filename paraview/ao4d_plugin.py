@@ -74,13 +74,14 @@ def environment():
     return {key: value for key, value in os.environ.items() if key not in hidden}
 
 
-def call(program, arguments, on_line=None, cancelled=lambda: False):
-    """Runs the program; returns what it prints, as JSON. Its messages go to `on_line`, line by line, while it runs."""
+def call(program, arguments, on_event=None, cancelled=lambda: False):
+    """Runs the program; returns what it prints, as JSON. What it tells meanwhile goes to `on_event`, and None every tenth of a second."""
+    arguments = arguments + ["--progress", "json"]
     quiet = {"creationflags": getattr(subprocess, "CREATE_NO_WINDOW", 0)}
     child = subprocess.Popen(
         [program] + arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment(), universal_newlines=True, **quiet
     )
-    lines, printed = [], []
+    lines, printed, events = [], [], []
     readers = [
         threading.Thread(target=_read, args=(child.stderr, lines)),
         threading.Thread(target=_read, args=(child.stdout, printed)),
@@ -97,22 +98,31 @@ def call(program, arguments, on_line=None, cancelled=lambda: False):
             for reader in readers:
                 reader.join()
         while seen < len(lines):
-            if on_line:
-                on_line(lines[seen])
+            events.append(event_of(lines[seen]))
+            if on_event:
+                on_event(events[-1])
             seen += 1
         if child.returncode is not None:
             break
-        if on_line:
-            on_line(None)
+        if on_event:
+            on_event(None)
         if not stopped and cancelled():
             stopped = True
             child.send_signal(signal.SIGINT) if os.name != "nt" else child.terminate()
     if stopped:
         raise Cancelled()
     if child.returncode:
-        errors = [line.strip() for line in lines if line.startswith("error:")] or [line.strip() for line in lines[-3:]]
-        raise Refused("ao4d: " + "\n".join(errors)[len("error: ") if errors and errors[0].startswith("error: ") else 0 :])
+        errors = [event["message"] for event in events if event["event"] == "error"]
+        raise Refused("ao4d: " + ("\n".join(errors) or "the program ended with %s" % child.returncode))
     return json.loads("".join(printed))
+
+
+def event_of(line):
+    """What a line of the program's messages tells. What is wrong with its arguments is told as text, in a few lines."""
+    try:
+        return json.loads(line)
+    except ValueError:
+        return {"event": "error", "message": re.sub(r"^error: ", "", line.rstrip())}
 
 
 def _read(stream, lines):
@@ -345,21 +355,23 @@ class Base(VTKPythonAlgorithmBase):
             return self._made
         self._made = None
         program = find_program(self.get("Program"))
-        steps = {"done": 0}
+        shown = {"before": 0.0, "now": 0.0}
 
-        def on_line(line):
-            # Each stage says when it is done (-v); between them the bar creeps, so that one sees that work goes on.
-            if line is None:
-                steps["done"] += (0.95 - steps["done"]) * 0.01
-            elif re.match(r"^[^:]+: [0-9.]+ s$", line.strip()):
-                steps["done"] += (0.95 - steps["done"]) * 0.4
-            elif line.startswith(("note:", "warning:")) and "no `write` stage writes" not in line:
-                tell("ao4d: " + line)
-            self.UpdateProgress(min(steps["done"], 0.99))
+        def on_event(event):
+            # How many stages will do something is not known before: each takes some of the bar that is left.
+            kind, left = event and event["event"], 0.4 * (1.0 - shown["before"])
+            if kind == "advance" and event["total"]:
+                shown["now"] = shown["before"] + left * min(1.0, event["done"] / event["total"])
+            elif kind == "end":
+                shown["now"] = shown["before"] = shown["before"] + left
+            elif kind in ("note", "warning") and "no `write` stage writes" not in event["message"]:
+                tell("ao4d: %s: %s" % (kind, event["message"]))
+            # Also when nothing is told: by this ParaView learns of Cancel.
+            self.UpdateProgress(shown["now"])
 
-        arguments = ["run", "--json", "-v", "--out", folder or self._folder, file]
+        arguments = ["run", "--json", "--out", folder or self._folder, file]
         arguments += [part for one in sets for part in ("--set", one)]
-        report = call(program, arguments, on_line, self.stopped)
+        report = call(program, arguments, on_event, self.stopped)
         self._what, self._made = key, report
         return report
 

@@ -28,6 +28,8 @@ PANELS = @PANELS@
 # How many frames the animations have, and how many of them a second; None if there is no animation.
 FRAMES = @FRAMES@
 RATE = @RATE@
+# The frames' times in their `.pvd`, if not seconds: of a sequence of slices, where they are.
+TIMES = @TIMES@
 # 'vti', or 'raw' for float32 triples without a header.
 SOURCE = @SOURCE@
 # None, ('octant', its corner or None for the middle), or ('plane', 0 to 2 for x to z, position).
@@ -114,6 +116,8 @@ def is_animation(panel):
 
 def frame_times():
     """The times of the frames; of a figure without animations the one time there is."""
+    if TIMES:
+        return TIMES
     return [k / RATE for k in range(FRAMES)] if FRAMES else [0.0]
 
 
@@ -339,13 +343,17 @@ def show_bar(v):
 def show_caption(text, v):
     label = Text(registrationName='Caption: ' + text, Text='\n' + text)
     d = Show(label, v, 'TextSourceRepresentation')
-    for place in ('Upper Center', 'UpperCenter'):
+    locate_text(d, 'Upper Center')
+    setp(d, Color=TEXT, FontSize=text_size(), FontFamily='Arial', Bold=0, Shadow=0)
+
+
+def locate_text(d, place):
+    for name in (place, place.replace(' ', '')):  # as the version of ParaView writes it
         try:
-            d.WindowLocation = place
+            d.WindowLocation = name
             break
         except ValueError:
             pass
-    setp(d, Color=TEXT, FontSize=text_size(), FontFamily='Arial', Bold=0, Shadow=0)
 
 
 BILLBOARDS = []
@@ -541,17 +549,43 @@ def show_edges(panel, box, v, aspect):
     return array
 
 
+def bounds_over_time(reader):
+    """A box around all frames; none if nothing is in them."""
+    boxes = []
+    for time in frame_times():
+        reader.UpdatePipeline(time)
+        if is_filled(reader):
+            boxes.append(list(reader.GetDataInformation().GetBounds()))
+    reader.UpdatePipeline(frame_times()[0])
+    return union_of(boxes) if boxes else None
+
+
+def has_occlusion(reader):
+    return 'ambient_occlusion' in reader.PointData.keys()
+
+
 def show_slices_alone(panel, v, aspect):
-    """Surfaces that lie in one space. Several have a colour each, and are cut open as CUT says to show the inside."""
-    readers = [read_polydata(name) for name in panel['files']]
-    filled = [(k, reader) for k, reader in enumerate(readers) if is_filled(reader)]
+    """Surfaces that lie in one space. Several have a colour each, and are cut open as CUT says to show the inside.
+
+    A sequence that is played has one at a time, with its place below.
+    """
     light_view(v)
-    if not filled:
+    if is_animation(panel):
+        readers = [read_pvd(panel)]
+        filled, box = [(0, readers[0])], bounds_over_time(readers[0])
+        place = AnnotateTimeFilter(registrationName=panel['file'] + ': place', Input=readers[0])
+        setp(place, Format='at {time:.3g}')
+        d = Show(place, v, 'TextSourceRepresentation')
+        locate_text(d, 'Lower Center')
+        setp(d, Color=TEXT, FontSize=text_size(), FontFamily='Arial', Bold=0, Shadow=0)
+    else:
+        readers = [read_polydata(name) for name in panel['files']]
+        filled = [(k, reader) for k, reader in enumerate(readers) if is_filled(reader)]
+        box = union_of([reader.GetDataInformation().GetBounds() for _, reader in filled]) if filled else None
+    if box is None:
         return
-    box = union_of([reader.GetDataInformation().GetBounds() for _, reader in filled])
     for k, reader in filled:
         name = os.path.splitext(panel['files'][k])[0]
-        flat = reader.GetDataInformation().GetBounds()
         skin = ProgrammableFilter(registrationName=name + ': skin', Input=reader)
         skin.Script = 'NUMBER, TINTS = %r, %r\n' % (k if len(readers) > 1 else None, TINTS) + SLICE_SKIN
         shown = skin
@@ -572,12 +606,12 @@ def show_slices_alone(panel, v, aspect):
             HideInteractiveWidgets(shown.ClipType)
         d = Show(shown, v)
         d.SetRepresentationType('Surface')
-        if COLOR_BY == 'ambient_occlusion' and 'ambient_occlusion' in reader.PointData.keys():
+        if COLOR_BY == 'ambient_occlusion' and has_occlusion(reader):
             colour_by(d, 'POINTS', 'rgb')
         else:
             d.ColorArrayName, d.LookupTable, d.MapScalars = ['POINTS', 'rgb'], GetColorTransferFunction('rgb'), 0
         setp(d, Ambient=0.5, Diffuse=0.5, Specular=0.0, Interpolation='Gouraud')
-        if flat[5] == flat[4]:  # outlines of 3D scenes
+        if box[5] == box[4]:  # outlines of 3D scenes
             setp(d, LineWidth=3.0)
     place_camera(v, box, aspect, 0.05)
 
@@ -602,8 +636,11 @@ def picture_size():
     width = panel_width(columns)
     heights = []
     for panel in PANELS:
-        b = grid_bounds(panel)
-        heights.append(width * (1.08 * (b[3] - b[2]) / (b[1] - b[0]) if is_image(panel) else TALL))
+        if is_image(panel):
+            b = grid_bounds(panel)
+            heights.append(width * 1.08 * (b[3] - b[2]) / (b[1] - b[0]))
+        else:
+            heights.append(width * TALL)
     height = smallest(largest(largest(heights), 0.3 * width), 2.0 * width)
     return [width * columns, rows * int(height + 0.5)]
 
@@ -671,7 +708,7 @@ def prepare_time():
     scene = GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
     setp(scene, PlayMode='Snap To TimeSteps')
-    scene.AnimationTime = 0.0
+    scene.AnimationTime = frame_times()[0]
 
 
 def build_figure():
@@ -684,7 +721,7 @@ def build_figure():
 
     prepare_colours()
     readers = [read_panel(panel) for panel in PANELS if is_volume(panel)]
-    if FRAMES:
+    if FRAMES and readers:
         prepare_time()
     volumes = [panel for panel in PANELS if is_volume(panel)]
     arrays = [colour_array(reader, panel) for reader, panel in zip(readers, volumes)]
@@ -720,6 +757,8 @@ def build_figure():
                 AddCameraLink(seen[0], v, 'camera of ' + (panel['caption'] or panel['file']))
         elif not is_volume(panel):
             show_slices_alone(panel, v, shape)
+    if TIMES:  # the sequences are known now
+        prepare_time()
     finish_tubes(tubes)
     for panel, v in zip(PANELS, views):
         if panel['caption']:

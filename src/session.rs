@@ -13,7 +13,7 @@ use crate::occlusion::{Bounced, Directional, Error, Estimates, Estimator};
 use crate::progress::Progress;
 use crate::render::{Aov, Camera, Renderer, Shading, radiosity};
 use crate::trace::cpu::CpuBackend;
-use crate::trace::opencl::{self, OpenCl, OpenClBackend};
+use crate::trace::opencl::{OpenCl, OpenClBackend};
 use crate::trace::{RayBackend, ShadingPoint};
 use crate::volume::Volume;
 
@@ -23,24 +23,32 @@ pub struct Session<const D: usize> {
     tracer: Arc<Tracer<D>>,
     hash: OnceLock<String>,
     opencl: Option<Arc<OpenCl>>,
-    backend: OnceLock<Arc<dyn RayBackend<D>>>,
+    backend: Arc<dyn RayBackend<D>>,
 }
 
 impl<const D: usize> Session<D> {
     /// A scene whose rays are traced by the processor.
     pub fn new(mesh: impl Into<Arc<Mesh<D>>>) -> Self {
-        let tracer = Arc::new(Tracer::new(mesh));
-        Self { tracer, hash: OnceLock::new(), opencl: None, backend: OnceLock::new() }
+        Self::by(mesh, None)
     }
 
     /// A scene whose rays are traced by OpenCL devices, which get it when they are first asked to.
     pub fn on(mesh: impl Into<Arc<Mesh<D>>>, opencl: Arc<OpenCl>) -> Self {
-        Self { opencl: Some(opencl), ..Self::new(mesh) }
+        Self::by(mesh, Some(opencl))
     }
 
     /// Another scene, whose rays are traced by the same.
     pub fn with_mesh(&self, mesh: impl Into<Arc<Mesh<D>>>) -> Self {
-        Self { opencl: self.opencl.clone(), ..Self::new(mesh) }
+        Self::by(mesh, self.opencl.clone())
+    }
+
+    fn by(mesh: impl Into<Arc<Mesh<D>>>, opencl: Option<Arc<OpenCl>>) -> Self {
+        let tracer = Arc::new(Tracer::new(mesh));
+        let backend: Arc<dyn RayBackend<D>> = match &opencl {
+            None => Arc::new(CpuBackend::new(Arc::clone(&tracer))),
+            Some(opencl) => Arc::new(OpenClBackend::new(opencl, Arc::clone(&tracer))),
+        };
+        Self { tracer, hash: OnceLock::new(), opencl, backend }
     }
 
     /// The scene's mesh.
@@ -59,15 +67,8 @@ impl<const D: usize> Session<D> {
     }
 
     /// What traces rays.
-    ///
-    /// # Errors
-    /// If the scene doesn't fit on the device.
-    pub fn backend(&self) -> Result<&Arc<dyn RayBackend<D>>, opencl::Error> {
-        if let (None, Some(opencl)) = (self.backend.get(), &self.opencl) {
-            let device = OpenClBackend::new(opencl, Arc::clone(&self.tracer))?;
-            let _ = self.backend.set(Arc::new(device));
-        }
-        Ok(self.backend.get_or_init(|| Arc::new(CpuBackend::new(Arc::clone(&self.tracer)))))
+    pub fn backend(&self) -> &Arc<dyn RayBackend<D>> {
+        &self.backend
     }
 
     /// Ambient occlusion at the vertices. If there is a `mask`, only where it says so; elsewhere values are 1.
@@ -81,7 +82,7 @@ impl<const D: usize> Session<D> {
         mask: Option<&[bool]>,
         progress: &dyn Progress,
     ) -> Result<Estimates, Error> {
-        estimator.estimate(&**self.backend()?, &ShadingPoint::vertices(self.mesh()), mask, progress)
+        estimator.estimate(&*self.backend, &ShadingPoint::vertices(self.mesh()), mask, progress)
     }
 
     /// Ambient occlusion at the vertices with the vector b of the open directions.
@@ -89,7 +90,7 @@ impl<const D: usize> Session<D> {
     /// # Errors
     /// As [`Session::occlusion`].
     pub fn directional(&self, estimator: Estimator, progress: &dyn Progress) -> Result<Directional<D>, Error> {
-        estimator.directional(&**self.backend()?, &ShadingPoint::vertices(self.mesh()), None, progress)
+        estimator.directional(&*self.backend, &ShadingPoint::vertices(self.mesh()), None, progress)
     }
 
     /// The light of other surfaces at the vertices, under a sky of this gradient: the radiosity of the vertices, which points
@@ -111,16 +112,8 @@ impl<const D: usize> Session<D> {
     }
 
     /// A picture to be made slab by slab.
-    ///
-    /// # Errors
-    /// If the scene doesn't fit on the device.
-    pub fn renderer(
-        &self,
-        camera: Camera<D>,
-        dimensions: [usize; 3],
-        shading: Shading,
-    ) -> Result<Renderer<D>, opencl::Error> {
-        Ok(Renderer::new(Arc::clone(self.backend()?), camera, dimensions, shading))
+    pub fn renderer(&self, camera: Camera<D>, dimensions: [usize; 3], shading: Shading) -> Renderer<D> {
+        Renderer::new(Arc::clone(&self.backend), camera, dimensions, shading)
     }
 
     /// A whole picture in memory, with these arrays.
@@ -135,6 +128,6 @@ impl<const D: usize> Session<D> {
         aovs: &[Aov],
         progress: &dyn Progress,
     ) -> Result<Volume, Error> {
-        self.renderer(camera, dimensions, shading)?.volume(aovs, progress)
+        self.renderer(camera, dimensions, shading).volume(aovs, progress)
     }
 }

@@ -32,11 +32,11 @@ fn many_runs_leave_nothing_behind() {
     let tracer = Arc::new(Tracer::new(row()));
     let points: Vec<ShadingPoint<4>> = (0..80).map(ShadingPoint::Vertex).collect();
     let sampling = Sampling::random(64, 5);
-    let device = OpenClBackend::new(&opencl, tracer.clone()).unwrap();
+    let device = OpenClBackend::new(&opencl, tracer.clone());
     let trace = |times: usize| {
         (0..times).for_each(|_| drop(device.open_fractions(&points, &sampling, &Silent).unwrap()));
     };
-    let bring = |times: usize| (0..times).for_each(|_| drop(OpenClBackend::new(&opencl, tracer.clone()).unwrap()));
+    let bring = |times: usize| (0..times).for_each(|_| OpenClBackend::new(&opencl, tracer.clone()).prepare().unwrap());
     for (what, run, times, most) in
         [("rays", &trace as &dyn Fn(usize), 1000, 8 << 20), ("scenes", &bring, 50, 24 << 20)]
     {

@@ -44,7 +44,7 @@ fn measure<const D: usize>(opencl: &OpenCl, name: &str, mesh: Mesh<D>) {
     };
     let (scalar, scalar_rate) = rate(rays / 8, || estimate(&ScalarBackend::new(tracer.clone()), &some));
     let (packets, packet_rate) = rate(rays, || estimate(&CpuBackend::new(tracer.clone()), &points));
-    let device = OpenClBackend::new(opencl, tracer.clone()).unwrap_or_else(|error| panic!("{error}"));
+    let device = OpenClBackend::new(opencl, tracer.clone());
     estimate(&device, &points); // Some drivers compile at the first launch.
     let before = device.settled();
     let (found, device_rate) = rate(rays, || estimate(&device, &points));

@@ -122,7 +122,12 @@ fn render<'py>(
     threads: Option<usize>,
     watch: Option<Py<PyAny>>,
 ) -> PyResult<Picture<'py>> {
-    let plan = pipeline(Some(text), "arguments", &[], None)?;
+    let document = Document::parse("arguments", text).map_err(refused)?;
+    let plan = match mesh.any() {
+        Any::Three(session) => Pipeline::around(document, session.mesh()),
+        Any::Four(session) => Pipeline::around(document, session.mesh()),
+    };
+    let plan = plan.map_err(refused)?;
     warn(py, &plan)?;
     let estimates = |(values, errors): (PyReadonlyArray1<'_, f32>, PyReadonlyArray1<'_, f32>)| -> PyResult<_> {
         Ok(Arc::new(Estimates { values: values.as_slice()?.to_vec(), errors: errors.as_slice()?.to_vec(), rays: 0 }))

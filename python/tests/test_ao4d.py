@@ -96,6 +96,19 @@ def test_pictures():
     assert not ao4d.compare(away, ao4d.render(mesh, found, dimensions=[4, 4, 4]))
 
 
+def test_cameras_fit_meshes_in_memory():
+    # In millimetres, far from where the default camera looks.
+    for dimension, size in ((4, [24, 24, 24]), (3, [24, 24])):
+        scene = {"dimension": dimension, "objects": [{"box": {"min": [40, 10, 0, 5][:dimension], "max": [120, 60, 30, 25][:dimension]}}]}
+        mesh = ao4d.load_scene({"name": "box", "stages": [{"scene": scene}]})
+        eye = ([0, 0, 0, 1] if dimension == 4 else [0, 0, 1])
+        picture = ao4d.render(mesh, False, dimensions=size, camera={"eye": eye, "fit": True}, dilate=0, supersample=1)
+        covered = picture["opacity"].reshape(-1, 24, 24) > 0
+        wide = covered.any(axis=(0, 1))
+        assert wide[2:22].all() and not wide[0] and not wide[-1], "its longest side all but fills the image"
+        assert 0.2 < covered.any(axis=(0, 2)).mean() < 0.9
+
+
 def test_pyvista_takes_pictures():
     picture = ao4d.render(two(), False, dimensions=[5, 6, 7], supersample=1)
     image = picture.to_pyvista()

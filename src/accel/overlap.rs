@@ -27,7 +27,7 @@ impl<const D: usize> Tracer<D> {
         };
         let mut found = vec![first];
         let mut normal: Option<Vector<D>> = None;
-        self.bvh().within(near, |other| {
+        self.around(position, room, |other| {
             let corners = mesh.corners(other);
             if other != first && near(&Aabb::of(&corners)) {
                 // Seen from far above the point, the other simplex is straight below. Most neighbours are not, which is
@@ -76,5 +76,48 @@ impl<const D: usize> Tracer<D> {
             false
         });
         best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vector64;
+    use crate::mesh::{MeshBuilder, Orientation, Surface};
+
+    fn check<const D: usize>() {
+        // On a lattice, so that much overlaps.
+        let mut state = 3u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from((state >> 24) % 4)
+        };
+        let mut surface = Surface::<D> { vertices: Vec::new(), simplices: Vec::new(), normals: None };
+        for s in 0..300 {
+            surface.vertices.extend((0..D).map(|_| Vector64::<D>::from_fn(|_, _| random())));
+            surface.simplices.push(std::array::from_fn(|i| (s * D + i) as u32));
+        }
+        let mut builder = MeshBuilder::new();
+        builder.add("soup", [1.0; 3], &surface, Orientation::Input).unwrap();
+        let mesh = std::sync::Arc::new(builder.finish());
+        let [binary, wide] = [Tracer::new(mesh.clone()), Tracer::new(mesh.clone())];
+        binary.prepare();
+        wide.prepare_wide();
+        assert!(!wide.is_prepared(), "the binary tree is kept beside the wide one");
+        assert_eq!(wide.spatial_order(), binary.spatial_order());
+        let mut several = 0;
+        for simplex in 0..mesh.simplices.len() as u32 {
+            let middle = mesh.corners(simplex).iter().sum::<Vector<D>>() / D as f32;
+            let found = binary.underfoot(simplex, &middle);
+            assert_eq!(wide.underfoot(simplex, &middle), found);
+            several += usize::from(found.len() > 1);
+        }
+        assert!(!wide.is_prepared() && several > 0, "{several}");
+    }
+
+    #[test]
+    fn either_hierarchy_finds_what_lies_in_one_hyperplane() {
+        check::<3>();
+        check::<4>();
     }
 }

@@ -7,7 +7,7 @@ use std::cmp::Ordering;
 use std::sync::{Arc, OnceLock};
 
 use super::{Bvh, WideBvh};
-use crate::geometry::{Aabb, Cone, Crossing, Ray};
+use crate::geometry::{Aabb, Cone, Crossing, Ray, Vector};
 use crate::mesh::{Incidence, Mesh};
 
 /// A mesh with the hierarchy over its simplices of positive measure, the first of each place, which is made when it is first asked for. It owns
@@ -57,20 +57,52 @@ impl<const D: usize> Tracer<D> {
         }
     }
 
-    /// [`Tracer::prepare`], and lays the hierarchy out for SIMD too.
+    /// Builds the hierarchy that is laid out for SIMD, on all threads, unless it is there. The binary one that it is made of
+    /// is kept only if it was there before, or is needed beside it: together they would be half as large again.
     pub fn prepare_wide(&self) {
-        self.prepare();
-        if self.wide.get().is_none() {
-            let _ = self.wide.set(WideBvh::new(self.bvh(), &self.mesh, true));
+        if self.wide.get().is_some() {
+            return;
         }
+        let wide = match self.bvh.get() {
+            Some(bvh) => WideBvh::new(bvh, &self.mesh, true),
+            None => {
+                let bvh = self.build(true);
+                let wide = WideBvh::new(&bvh, &self.mesh, true);
+                if !wide.is_whole() {
+                    let _ = self.bvh.set(bvh);
+                }
+                wide
+            }
+        };
+        let _ = self.wide.set(wide);
     }
 
-    /// Whether the hierarchy is there already.
+    /// Whether the binary hierarchy is there already.
     pub fn is_prepared(&self) -> bool {
         self.bvh.get().is_some()
     }
 
-    /// The hierarchy.
+    /// The simplices in the order of a hierarchy, whichever there is; that laid out for SIMD may leave out some that lie far
+    /// apart.
+    pub fn spatial_order(&self) -> &[u32] {
+        match (self.bvh.get(), self.wide.get()) {
+            (None, Some(wide)) => &wide.order,
+            _ => &self.bvh().order,
+        }
+    }
+
+    /// Calls `visit` for all simplices, and maybe some others, whose boxes are within `room` of the point on each axis.
+    pub(super) fn around(&self, point: &Vector<D>, room: f32, visit: impl FnMut(u32)) {
+        if let Some(wide) = self.wide.get().filter(|wide| wide.is_whole() && wide.serves(point)) {
+            wide.around(point, room, visit);
+            return;
+        }
+        let near =
+            |bounds: &Aabb<D>| (0..D).all(|k| bounds.min[k] - room <= point[k] && point[k] <= bounds.max[k] + room);
+        self.bvh().within(near, visit);
+    }
+
+    /// The binary hierarchy; made when first asked for, on one thread.
     #[inline]
     pub fn bvh(&self) -> &Bvh<D> {
         self.bvh.get_or_init(|| self.build(false))
@@ -88,7 +120,7 @@ impl<const D: usize> Tracer<D> {
         Bvh::build(&solid, |s| Aabb::of(&self.mesh.corners(s)), parallel)
     }
 
-    /// The same hierarchy laid out for SIMD; made when first asked for.
+    /// The same hierarchy laid out for SIMD; made when first asked for, on one thread.
     pub fn wide(&self) -> &WideBvh<D> {
         self.wide.get_or_init(|| WideBvh::new(self.bvh(), &self.mesh, false))
     }

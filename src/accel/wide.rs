@@ -183,6 +183,36 @@ impl<const D: usize> WideBvh<D> {
             && point.iter().all(|&x| self.scale.keeps(x))
     }
 
+    /// Whether everything is in the nodes and leaves, and references reach it: then points within the scene never need the binary
+    /// tree, but for those that vanish when scaled.
+    pub fn is_whole(&self) -> bool {
+        self.fine && !self.of_part && self.lines.len() < 1 << (32 - KIND_BITS)
+    }
+
+    /// Calls `visit` for the simplices of leaves whose boxes are within `room` of the point on each axis. The tree must
+    /// [serve](Self::serves) the point.
+    pub fn around(&self, point: &Vector<D>, room: f32, mut visit: impl FnMut(u32)) {
+        let point = self.scale.scaled(point);
+        let room = (f64::from(room) * self.scale.factor) as f32;
+        let mut open: Vec<Reference> = self.root().into_iter().collect();
+        while let Some(reference) = open.pop() {
+            if reference & LEAF != 0 {
+                Leaf::<D>::at(self.rows(), reference).range().for_each(|place| visit(self.order[place]));
+                continue;
+            }
+            let node = WideNode::<D>::at(self.rows(), reference);
+            let mut near = [true; WIDTH];
+            for axis in 0..D {
+                let (middle, half) = (node.middle(axis), node.half(axis));
+                for lane in 0..WIDTH {
+                    // A little more than `room`, for the rounding. Places without a child have negative widths.
+                    near[lane] &= (point[axis] - middle[lane]).abs() <= (half[lane] + room) * (1.0 + 1e-5);
+                }
+            }
+            open.extend(node.children().iter().zip(near).filter(|(_, near)| *near).map(|(child, _)| *child));
+        }
+    }
+
     /// Whether these simplices, too, lie where the coordinates of the leaves are made for.
     pub fn holds(&self, simplices: &[u32], mesh: &Mesh<D>) -> bool {
         !self.of_part || simplices.iter().all(|&s| mesh.corners(s).iter().all(|v| self.is_near(v)))

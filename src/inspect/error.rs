@@ -17,7 +17,7 @@ pub enum Error {
         cause: std::io::Error,
     },
     /// Its name doesn't tell what it holds.
-    #[error("{}: can't tell what it holds; the name should end in .vti, .vtu, .vtp, .vtk, .f32, .raw, .stl, .obj, .ply or .msh, of images also in .nii, .hdr (of a .img), .nrrd, .nhdr, .nc, .h5 or .tif", path.display())]
+    #[error("{}: can't tell what it holds; the name should end in .vti, .vtu, .vtp, .vtk, .f32, .raw, .stl, .obj, .ply, .msh or .pvd, of images also in .nii, .hdr (of a .img), .nrrd, .nhdr, .nc, .h5 or .tif", path.display())]
     Unknown {
         /// The file.
         path: PathBuf,

@@ -79,12 +79,14 @@ pub enum Hidden {
 }
 
 /// How long animations are.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     /// How many frames there are.
     pub frames: usize,
     /// How many of them a second.
     pub rate: f64,
+    /// The times that the `.pvd` gives the frames, where these are not seconds from 0 on: of slices, where they are.
+    pub times: Option<Vec<f64>>,
 }
 
 /// How volumes are drawn. Images of one layer are shown pixel by pixel either way.
@@ -214,8 +216,12 @@ fn constant(figure: &Figure, name: &str) -> String {
             Cut::Plane { axis, at } => format!("('plane', {}, {})", axis as usize, number(at)),
         },
         "SCREENSHOT" => figure.screenshot.as_deref().map_or("None".into(), quoted),
-        "FRAMES" => figure.film.map_or("None".into(), |film| film.frames.to_string()),
-        "RATE" => figure.film.map_or("None".into(), |film| number(film.rate)),
+        "FRAMES" => figure.film.as_ref().map_or("None".into(), |film| film.frames.to_string()),
+        "RATE" => figure.film.as_ref().map_or("None".into(), |film| number(film.rate)),
+        "TIMES" => match figure.film.as_ref().and_then(|film| film.times.as_deref()) {
+            None => "None".into(),
+            Some(times) => numbers(times),
+        },
         "LOOK" => match figure.style {
             Style::Surface => SURFACE.into(),
             Style::Voxels => VOXELS.into(),
@@ -355,9 +361,12 @@ mod tests {
         // The cut is a clip of ParaView's, and the other look isn't there.
         assert!(text.contains(": cut', Input=bodies)") && !text.contains("RELIEF"));
 
-        figure.film = Some(Film { frames: 72, rate: 24.0 });
+        figure.film = Some(Film { frames: 72, rate: 24.0, times: None });
         let text = state(&figure);
         assert_eq!((line(&text, "FRAMES"), line(&text, "RATE")), ("FRAMES = 72".into(), "RATE = 24.0".into()));
+        assert_eq!(line(&text, "TIMES"), "TIMES = None");
+        figure.film = Some(Film { frames: 2, rate: 8.0, times: Some(vec![0.5, -0.25]) });
+        assert_eq!(line(&state(&figure), "TIMES"), "TIMES = [0.5, -0.25]");
         figure.film = None;
         figure.source = Source::Raw;
         figure.cut = Cut::Plane { axis: Axis::Z, at: 0.25 };

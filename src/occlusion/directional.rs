@@ -73,7 +73,10 @@ impl Estimator {
         progress: &dyn Progress,
     ) -> Result<Directional<D>, Error> {
         let tracer = backend.tracer();
-        tracer.prepare();
+        match self {
+            Self::Sampled(_) => tracer.prepare_wide(),
+            _ => tracer.prepare(),
+        }
         let order = spatial_order(tracer, points, None);
         let asked: Vec<ShadingPoint<D>> = order.iter().map(|&i| points[i]).collect();
         let known = self

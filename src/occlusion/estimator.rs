@@ -94,7 +94,11 @@ impl Estimator {
         if backend.tracer().mesh().is_translucent() && !matches!(self, Self::Sampled(_) | Self::Adaptive(_)) {
             return Err(Error::Translucent);
         }
-        backend.tracer().prepare();
+        // Rays of a device need the binary tree, closed forms do, and what the thesis did; those of the processor don't.
+        match self {
+            Self::Sampled(_) => backend.prepare()?,
+            _ => backend.tracer().prepare(),
+        }
         let order = spatial_order(backend.tracer(), points, mask);
         let asked: Vec<ShadingPoint<D>> = order.iter().map(|&i| points[i]).collect();
         let found = match *self {
@@ -132,7 +136,7 @@ pub(super) fn spatial_order<const D: usize>(
     const LAST: u32 = u32::MAX;
     let mesh = tracer.mesh();
     let (mut of_simplex, mut of_vertex) = (vec![LAST; mesh.simplices.len()], vec![LAST; mesh.vertices.len()]);
-    for (place, &simplex) in (0..).zip(&tracer.bvh().order) {
+    for (place, &simplex) in (0..).zip(tracer.spatial_order()) {
         of_simplex[simplex as usize] = place;
         for vertex in mesh.simplices[simplex as usize] {
             let first = &mut of_vertex[vertex as usize];

@@ -33,8 +33,9 @@ mod yaml;
 
 use std::path::{Path, PathBuf};
 
+use crate::mesh::Mesh;
 use crate::progress::{Progress, Silent};
-use crate::stages::fit::Fitted;
+use crate::stages::fit::{Fitted, Points};
 use crate::stages::prepare::Prepared;
 use crate::stages::write::PROGRAM;
 use crate::stages::{Invalid, Piece, Plan, suggest};
@@ -113,9 +114,22 @@ impl Pipeline {
         }
     }
 
-    fn resolve(mut document: Document, out: Option<PathBuf>) -> Result<Self, Error> {
+    /// A pipeline of a scene that is in memory: what the text says of its scene stands for this mesh, which cameras fit.
+    ///
+    /// # Errors
+    /// Whatever is wrong with it.
+    pub fn around<const D: usize>(document: Document, mesh: &Mesh<D>) -> Result<Self, Error> {
+        Self::resolve_with(document, None, vec![Points::of_mesh(mesh)])
+    }
+
+    fn resolve(document: Document, out: Option<PathBuf>) -> Result<Self, Error> {
+        Self::resolve_with(document, out, Vec::new())
+    }
+
+    /// Understands a document of whose scenes the first are `known`.
+    fn resolve_with(mut document: Document, out: Option<PathBuf>, known: Vec<Points>) -> Result<Self, Error> {
         let (spec, mut plan) = Self::understood(&document, out.clone())?;
-        let fitted = plan.fit(&Silent).map_err(|invalid| document.refuse(invalid))?;
+        let fitted = plan.fit(known, &Silent).map_err(|invalid| document.refuse(invalid))?;
         if !fitted.is_empty() {
             fitted.iter().for_each(|Fitted { path, camera }| document.put(path, camera));
             // What there is to say of it was said of what was written.

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::Serialize;
+use serde_json::{Map, Value};
 
-use crate::stages::Work;
 use crate::stages::describe::size;
+use crate::stages::{Told, Work};
 
 /// A finished run.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -38,6 +39,8 @@ pub struct StageTime {
     pub seconds: f64,
     /// More about the work: rays a second, say.
     pub detail: String,
+    /// The numbers in it, by their names.
+    pub numbers: Map<String, Value>,
 }
 
 /// A file in the output folder.
@@ -53,15 +56,16 @@ pub struct FileReport {
 
 impl Report {
     /// Adds a stage.
-    pub fn stage(&mut self, stage: String, time: Duration, detail: String) {
-        self.stages.push(StageTime { stage, seconds: time.as_secs_f64(), detail });
+    pub fn stage(&mut self, stage: String, time: Duration, told: Told) {
+        let Told { text: detail, numbers } = told;
+        self.stages.push(StageTime { stage, seconds: time.as_secs_f64(), detail, numbers });
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = self.stages.iter().map(|s| s.stage.chars().count()).max().unwrap_or(0);
-        for StageTime { stage, seconds, detail } in &self.stages {
+        for StageTime { stage, seconds, detail, .. } in &self.stages {
             writeln!(f, "{}", format!("{stage:width$}  {seconds:7.3} s  {detail}").trim_end())?;
         }
         writeln!(f, "{:width$}  {:7.3} s", "in all", self.seconds)?;

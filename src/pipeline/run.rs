@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use serde_json::json;
+
 use super::book::Book;
 use super::cache::MadeBy;
 use super::lock::{Busy, Lock};
@@ -29,7 +31,7 @@ use crate::stages::occlusion::OcclusionPlan;
 use crate::stages::piece::Joined;
 use crate::stages::prepare::{Loaded, Prepared};
 use crate::stages::scene::{AnyMesh, ScenePlan};
-use crate::stages::{Keys, Ledger, Needs, Ref, Run, SceneRun, StageError, Work};
+use crate::stages::{Keys, Ledger, Needs, Ref, Run, SceneRun, StageError, Told, Work};
 use crate::trace::opencl::OpenCl;
 use crate::volume::available_memory;
 
@@ -194,8 +196,8 @@ fn run_here(
     let mut report = book.report();
     (report.work, report.piece) = (work, plan.piece.map(|piece| piece.to_string()));
     for (index, stage) in plan.stages.iter().enumerate() {
-        let (time, detail) = times.remove(&index).unwrap_or_default();
-        report.stage(format!("{} {}", plan.kind(index), stage.id), time, detail);
+        let (time, told) = times.remove(&index).unwrap_or_default();
+        report.stage(format!("{} {}", plan.kind(index), stage.id), time, told);
     }
     report.seconds = began.elapsed().as_secs_f64();
     Ok(report)
@@ -237,7 +239,7 @@ struct Schedule<'p> {
     force: bool,
     joined: Option<Joined>,
     work: Work,
-    times: BTreeMap<usize, (Duration, String)>,
+    times: BTreeMap<usize, (Duration, Told)>,
     share: Share<'p>,
 }
 
@@ -278,7 +280,8 @@ impl Schedule<'_> {
         let mesh = Arc::clone(at_work.session.mesh());
         let (vertices, simplices) = (mesh.vertices.len() as u64, mesh.simplices.len() as u64);
         let detail = format!("{} vertices, {} simplices", grouped(vertices), grouped(simplices));
-        self.times.insert(scene.index(), (building, detail));
+        let told = Told::new(detail, json!({ "vertices": vertices, "simplices": simplices }));
+        self.times.insert(scene.index(), (building, told));
         self.book.begin_scene(notes.clone());
         let is_shaded = plan.all::<OcclusionPlan>().any(|(_, occlusion)| occlusion.scene == scene);
         if self.opencl.is_some() && mesh.is_translucent() && is_shaded {
@@ -310,11 +313,7 @@ impl Schedule<'_> {
         Ok(())
     }
 
-    fn stage(
-        &mut self,
-        stage: usize,
-        work: impl FnOnce(&mut Run) -> Result<String, StageError>,
-    ) -> Result<(), RunError> {
+    fn stage(&mut self, stage: usize, work: impl FnOnce(&mut Run) -> Result<Told, StageError>) -> Result<(), RunError> {
         let start = Instant::now();
         let mut run = Run {
             plan: &self.pipeline.plan,
@@ -327,15 +326,21 @@ impl Schedule<'_> {
             work: self.work,
             early: BTreeMap::new(),
         };
-        let detail = work(&mut run)?;
+        let told = work(&mut run)?;
+        let mut own = start.elapsed();
         (self.loaded, self.work) = (run.loaded, run.work);
-        // Values that a picture needed are told at the occlusion they are of.
-        for (index, (_, detail)) in run.early {
-            self.times.entry(index).or_default().1 = detail;
+        // Values that a picture needed are told at the occlusion they are of, and so is the time that they took.
+        for (index, (took, told)) in run.early {
+            own = own.saturating_sub(took);
+            let known = self.times.entry(index).or_default();
+            known.0 += took;
+            known.1 = told;
         }
         let known = self.times.entry(stage).or_default();
-        known.0 += start.elapsed();
-        known.1 = detail;
+        known.0 += own;
+        if !told.text.is_empty() {
+            known.1 = told;
+        }
         Ok(())
     }
 }

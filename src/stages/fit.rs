@@ -20,6 +20,7 @@ use super::render::RenderPlan;
 use super::scene::{Bodies, ScenePlan};
 use super::{Invalid, Plan, Ref};
 use crate::geometry::{Dimension, Vector64};
+use crate::mesh::Mesh;
 use crate::progress::Progress;
 
 /// A render whose camera was placed by its scene.
@@ -31,12 +32,14 @@ pub(crate) struct Fitted {
 }
 
 impl Plan {
-    /// Places the cameras that are to fit their scenes, which are built for that. Twins take those of the stages they belong to.
+    /// Places the cameras that are to fit their scenes: those that are `known`, or else they are built for that. Twins take
+    /// those of the stages they belong to.
     ///
     /// # Errors
     /// Whatever is wrong with an object or a file; a scene with nothing in it.
-    pub(crate) fn fit(&self, progress: &dyn Progress) -> Result<Vec<Fitted>, Invalid> {
-        let mut scenes: Vec<Option<Points>> = self.all::<ScenePlan>().map(|_| None).collect();
+    pub(crate) fn fit(&self, known: Vec<Points>, progress: &dyn Progress) -> Result<Vec<Fitted>, Invalid> {
+        let mut scenes: Vec<Option<Points>> = known.into_iter().map(Some).collect();
+        scenes.resize_with(scenes.len().max(self.all::<ScenePlan>().count()), || None);
         let mut found = Vec::new();
         for (me, render) in self.all::<RenderPlan>().filter(|(me, _)| !self.is_twin(me.index())) {
             let Some(margin) = render.camera.fit else { continue };
@@ -60,12 +63,23 @@ impl Plan {
 }
 
 /// The vertices of a scene that simplices use.
-enum Points {
+pub(crate) enum Points {
     Three(Vec<Vector64<3>>),
     Four(Vec<Vector64<4>>),
 }
 
 impl Points {
+    /// Those of a mesh.
+    pub(crate) fn of_mesh<const D: usize>(mesh: &Mesh<D>) -> Self {
+        let mut used = vec![false; mesh.vertices.len()];
+        mesh.simplices.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let points = mesh.vertices.iter().zip(&used).filter(|(_, used)| **used).map(|(point, _)| point);
+        match Dimension::of::<D>() {
+            Dimension::Three => Self::Three(points.map(|p| Vector64::from_fn(|r, _| p[r].into())).collect()),
+            Dimension::Four => Self::Four(points.map(|p| Vector64::from_fn(|r, _| p[r].into())).collect()),
+        }
+    }
+
     fn of(plan: &Plan, scene: Ref<ScenePlan>, progress: &dyn Progress) -> Result<Self, Invalid> {
         Ok(match plan[scene].dimension {
             Dimension::Three => Self::Three(Bodies::build(plan, scene, progress)?.used_points()),

@@ -325,7 +325,9 @@ impl LightingPlan {
 pub(super) fn in_vain<const D: usize>(lighting: &Lighting<D>) -> Vec<String> {
     let mut notes = Vec::new();
     for i in lighting.in_vain() {
-        let why = match lighting.lights()[i].source {
+        let light = &lighting.lights()[i];
+        let why = match light.source {
+            _ if light.strength == [0.0; 3] => "its intensity or its color is 0",
             Source::Point(_) => "it is inside a body or behind one, or what is seen turns its back to it",
             Source::Directional(_) => "what is seen turns its back to it, or lies in the shadow of something",
         };

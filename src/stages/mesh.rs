@@ -16,7 +16,7 @@ use super::piece::{self, Piece};
 use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
 use super::write::{Found, MeshPart, vtu};
-use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told};
 use crate::io;
 
 /// A scene's mesh as it is, without a camera.
@@ -102,11 +102,11 @@ impl Stage for MeshPlan {
         format!("{} {with}{} -> {}", plan.id(*scene), simplices.unwrap_or_default(), file.display())
     }
 
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         let MeshPlan { occlusion, file, .. } = &plan[me];
         if !run.is_stale(file) {
-            return Ok("as it was".to_owned());
+            return Ok("as it was".into());
         }
         if let Some(occlusion) = *occlusion {
             occlusion::values(occlusion, run, scene)?;
@@ -130,6 +130,6 @@ impl Stage for MeshPlan {
             run.made_beside(&list, 0)?;
         }
         run.made(file, bytes, Vec::new())?;
-        Ok(String::new())
+        Ok(Told::default())
     }
 }

@@ -73,7 +73,7 @@ pub use one_or_many::OneOrMany;
 pub use piece::Piece;
 pub use plan::{Plan, Planned, Ref};
 pub use resolve::Resolver;
-pub use run::{Ledger, Made, Run, SceneRun, Work};
+pub use run::{Ledger, Made, Run, SceneRun, Told, Work};
 
 /// Coordinates and lengths beyond this are refused: their squares must stay far inside `f32`.
 pub const MAX_LENGTH: f64 = 1e12;
@@ -197,16 +197,16 @@ pub trait Stage: plan::OfKind + Serialize {
     ///
     /// # Errors
     /// [`StageError`]
-    fn run<const D: usize>(_me: Ref<Self>, _run: &mut Run, _scene: &mut SceneRun<D>) -> Result<String, StageError> {
-        Ok(String::new())
+    fn run<const D: usize>(_me: Ref<Self>, _run: &mut Run, _scene: &mut SceneRun<D>) -> Result<Told, StageError> {
+        Ok(Told::default())
     }
 
     /// The same for a stage that is about no scene.
     ///
     /// # Errors
     /// [`StageError`]
-    fn run_last(_me: Ref<Self>, _run: &mut Run) -> Result<String, StageError> {
-        Ok(String::new())
+    fn run_last(_me: Ref<Self>, _run: &mut Run) -> Result<Told, StageError> {
+        Ok(Told::default())
     }
 }
 
@@ -350,11 +350,11 @@ macro_rules! stages {
                 index: usize,
                 run: &mut Run,
                 scene: &mut SceneRun<D>,
-            ) -> Result<String, StageError> {
+            ) -> Result<Told, StageError> {
                 match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::run(self.at(index), run, scene)),+ }
             }
 
-            pub fn run_last(&self, index: usize, run: &mut Run) -> Result<String, StageError> {
+            pub fn run_last(&self, index: usize, run: &mut Run) -> Result<Told, StageError> {
                 match self.stages[index].plan { $(StagePlan::$name(_) => <$plan>::run_last(self.at(index), run)),+ }
             }
         }

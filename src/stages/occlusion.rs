@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ use super::range::positive;
 use super::render::{self, RenderPlan};
 use super::scene::{MISSING, ScenePlan};
 use super::write::{self, PROGRAM, WritePlan, write_whole};
-use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told};
 use crate::io;
 use crate::occlusion::exact::{self, Budget};
 use crate::occlusion::{self, Deviations, Estimates, Estimator, ProgramDeviations, Sidecar};
@@ -287,26 +287,26 @@ impl Stage for OcclusionPlan {
         }
     }
 
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         if plan.piece.is_some() {
             if run.is_stale(&piece::values_of(me.nth())) {
                 values(me, run, scene)?;
             }
-            return Ok(String::new());
+            return Ok(Told::default());
         }
-        let Some(file) = plan[me].file.as_deref() else { return Ok(String::new()) };
+        let Some(file) = plan[me].file.as_deref() else { return Ok(Told::default()) };
         if !run.is_stale(file) {
-            return Ok("as it was".to_owned());
+            return Ok("as it was".into());
         }
         let start = Instant::now();
         values(me, run, scene)?;
         let found = Arc::clone(&scene.values[&me]);
-        let detail = rate(&found, start);
+        let detail = rate(&found, start.elapsed());
         let sidecar = match (&plan[me].source, run.loaded.get(&me)) {
             (OcclusionSource::Compute(computation), _) => sidecar(&found, computation, scene.session.mesh_hash()),
             (OcclusionSource::Load(_), Some(loaded)) => loaded.sidecar.clone(),
-            (OcclusionSource::Load(_), None) => return Ok(String::new()),
+            (OcclusionSource::Load(_), None) => return Ok(Told::default()),
         };
         let sidecar = Sidecar { pipeline: Some(run.told.to_owned()), ..sidecar };
         // The values last: they are what others look for.
@@ -389,7 +389,7 @@ pub fn values<const D: usize>(
         OcclusionSource::Compute(computation) if plan.piece.is_some() => {
             let start = Instant::now();
             let found = in_piece(me, computation, run, scene)?;
-            run.early.entry(me.index()).or_default().1 = rate(&found, start);
+            run.tell_early(me.index(), start.elapsed(), |took| rate(&found, took));
             found
         }
         OcclusionSource::Compute(computation) => {
@@ -407,8 +407,7 @@ pub fn values<const D: usize>(
                 None => {
                     let start = Instant::now();
                     let found = compute(me, computation, run, scene)?;
-                    let known = run.early.entry(me.index()).or_default();
-                    known.1 = rate(&found, start);
+                    run.tell_early(me.index(), start.elapsed(), |took| rate(&found, took));
                     found
                 }
             }
@@ -606,18 +605,18 @@ fn mask<const D: usize>(
 }
 
 /// How fast values were found since then.
-fn rate(found: &Estimates, start: Instant) -> String {
-    let rays = match found.rays {
-        0 => String::new(),
-        rays => {
-            let speed = rays as f64 / start.elapsed().as_secs_f64() / 1e6;
-            format!("{} rays, {speed:.2} million a second, ", grouped(rays))
-        }
-    };
-    match found.errors.len() {
-        0 => rays,
-        _ => format!("{rays}error {:.1e}", found.error()),
+fn rate(found: &Estimates, took: Duration) -> Told {
+    let (mut text, mut numbers) = (String::new(), json!({ "rays": found.rays }));
+    if found.rays > 0 {
+        let speed = found.rays as f64 / took.as_secs_f64();
+        text = format!("{} rays, {:.2} million a second, ", grouped(found.rays), speed / 1e6);
+        numbers["rays_per_second"] = speed.into();
     }
+    if !found.errors.is_empty() {
+        text += &format!("error {:.1e}", found.error());
+        numbers["error"] = found.error().into();
+    }
+    Told::new(text, numbers)
 }
 
 /// The keys about computing that are written.

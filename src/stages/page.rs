@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::animate::{AnimatePlan, Motion};
 use super::describe::Counts;
@@ -14,7 +15,7 @@ use super::paraview::Shown;
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
 use super::write::{Format, PROGRAM, WritePlan};
-use super::{Invalid, Keys, LeftOut, OneOrMany, Output, Plan, Ref, Resolver, Run, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, OneOrMany, Output, Plan, Ref, Resolver, Run, Stage, StageError, Told};
 use crate::io::AtomicFile;
 use crate::io::page::{self, Palette, Series, Voxels};
 use crate::io::vtk::{self, DataSet, Image};
@@ -33,7 +34,7 @@ pub struct PageSpec {
     /// A name for later stages to refer to.
     pub id: Option<String>,
     /// What it shows, by their ids: animations, renders or the writes of renders (default: all earlier ones that leave a
-    /// `.vti`).
+    /// `.vti`). The first is what is opened.
     pub input: Option<OneOrMany>,
     /// The file.
     pub html: String,
@@ -101,13 +102,13 @@ impl Stage for PagePlan {
         format!("{} -> {}", names.join(", "), plan[me].file.display())
     }
 
-    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
+    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<Told, StageError> {
         let (plan, page) = (run.plan, &run.plan[me]);
         if plan.piece.is_some() {
-            return Ok("made when the pieces are joined".to_owned());
+            return Ok("made when the pieces are joined".into());
         }
         if !run.is_stale(&page.file) {
-            return Ok("as it was".to_owned());
+            return Ok("as it was".into());
         }
         let frames: usize = page.shown.iter().map(|&shown| files(shown, plan).len()).sum();
         let running = run.progress.stage(&format!("page {}", plan.id(me)), 2 * frames as u64);
@@ -118,7 +119,8 @@ impl Stage for PagePlan {
         page::write(&mut file, &page.title, PROGRAM, RATE, &series).map_err(AtomicFile::name_in(&path))?;
         let bytes = file.commit()?;
         run.made(&page.file, bytes, Vec::new())?;
-        Ok(format!("{frames} frames"))
+        let noun = if frames == 1 { "frame" } else { "frames" };
+        Ok(Told::new(format!("{frames} {noun}"), json!({ "frames": frames })))
     }
 }
 
@@ -133,8 +135,10 @@ fn shown(spec: &PageSpec, path: &str, resolver: &Resolver) -> Result<Vec<Shown>,
     let Some(ids) = &spec.input else {
         let writes = plan.all::<WritePlan>().map(|(write, _)| write).filter(|&write| has_file(write)).map(Shown::Image);
         let animations = plan.all::<AnimatePlan>().map(|(animation, _)| Shown::Animation(animation));
-        // Animations first: a page is opened to turn something.
-        let all: Vec<Shown> = animations.chain(writes).filter(|&s| !plan.is_twin(s.index()) && fits(s)).collect();
+        let chosen = animations.chain(writes).filter(|&s| !plan.is_twin(s.index()) && fits(s));
+        let mut all: Vec<Shown> = chosen.collect();
+        // What comes first is what is opened: animations, since one wants to turn something, and what ambient occlusion darkens.
+        all.sort_by_key(|&shown| (matches!(shown, Shown::Image(_)), !is_dark(shown, plan)));
         return match all.is_empty() {
             true => Err(Invalid::new(
                 path,
@@ -167,6 +171,11 @@ fn shown(spec: &PageSpec, path: &str, resolver: &Resolver) -> Result<Vec<Shown>,
         return Err(Invalid::new(format!("{path}.input"), "the list is empty; name at least one image"));
     }
     Ok(all)
+}
+
+/// Whether ambient occlusion darkens what is shown.
+fn is_dark(shown: Shown, plan: &Plan) -> bool {
+    shown.render(plan).is_some_and(|render| plan[render].is_dark())
 }
 
 /// What a picture is called: an animation by its own name, an image by that of its render.

@@ -21,15 +21,18 @@ use super::scene::ScenePlan;
 use super::slice::SlicePlan;
 use super::wireframe::WireframePlan;
 use super::write::{Format, PROGRAM, WritePlan, write_whole};
-use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError};
+use super::{Invalid, LeftOut, Made, OneOrMany, Plan, Ref, Resolver, Run, Stage, StageError, Told};
 use crate::geometry::Dimension;
-use crate::io::paraview;
+use crate::io::paraview::{self, Film};
 use crate::render::Aov;
 use crate::text::number;
 use crate::volume::Grid;
 
 /// How opaque skins are below tubes, where nothing else is said.
 const SKIN: f64 = 0.3;
+
+/// How many slices of a sequence a film has a second.
+const SLICES_A_SECOND: f64 = 8.0;
 
 /// A ParaView state (a Python file) that shows images side by side.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
@@ -42,6 +45,8 @@ pub struct ParaviewSpec {
     pub input: Option<OneOrMany>,
     /// How the edges of wireframes are drawn, and which are drawn over images.
     pub edges: Option<EdgesSpec>,
+    /// How a sequence of slices is shown (default `together`).
+    pub slices: Option<Sequence>,
     /// The state: `NAME.py`.
     pub state: String,
     /// The picture that the state writes when it is run: `NAME.png`. Of animations it is the first frame; all of them are
@@ -118,6 +123,17 @@ pub struct EdgesPlan {
     pub radius: Option<f64>,
     /// How opaque the skins below are.
     pub skin: f64,
+}
+
+/// How a figure shows a sequence of slices.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sequence {
+    /// All at once, each in a colour, cut open as `cut` says.
+    #[default]
+    Together,
+    /// One after the other, as ParaView plays time; the film has eight a second.
+    Play,
 }
 
 /// How a figure draws volumes.
@@ -221,11 +237,17 @@ impl Shown {
         }
     }
 
-    /// How many frames it has, and how many of them a second, if it changes.
-    fn frames(self, plan: &Plan) -> Option<(usize, f64)> {
+    /// Its frames, if it changes.
+    fn film(self, plan: &Plan, slices: Sequence) -> Option<Film> {
         match self {
+            Self::Animation(animation) => {
+                Some(Film { frames: plan[animation].files.len(), rate: plan[animation].rate, times: None })
+            }
+            Self::Slice(slice) if slices == Sequence::Play && plan[slice].list.is_some() => {
+                let places = plan[slice].places.clone();
+                Some(Film { frames: places.len(), rate: SLICES_A_SECOND, times: Some(places) })
+            }
             Self::Image(_) | Self::Wireframe(_) | Self::Slice(_) => None,
-            Self::Animation(animation) => Some((plan[animation].files.len(), plan[animation].rate)),
         }
     }
 }
@@ -243,6 +265,8 @@ pub struct FigurePlan {
     pub film: Option<PathBuf>,
     /// How it draws edges; none if it has none.
     pub edges: Option<EdgesPlan>,
+    /// How it shows sequences of slices.
+    pub slices: Sequence,
     /// Which files it reads.
     pub reader: Reader,
     /// How the volumes are cut open.
@@ -281,14 +305,19 @@ impl Stage for FigurePlan {
                 }
             }
         }
-        check_frames(resolver, path, reader, &writes)?;
+        let slices = spec.slices.unwrap_or_default();
+        let first = check_frames(resolver, path, reader, &writes, slices)?;
+        let played = first.as_ref().is_some_and(|film| film.times.is_some());
+        if slices == Sequence::Play && !played {
+            resolver.warn(format!("{path}.slices"), "has no use where no sequence of slices is shown");
+        }
         let edges = edges(spec, path, &writes, resolver)?;
         let (style, color_by) = (spec.style.unwrap_or_default(), spec.color_by.unwrap_or_default());
         if color_by == ColorBy::AmbientOcclusion {
             check_occlusion(resolver, path, reader, &writes)?;
         }
         if style == Style::Surface && reader == Reader::Vti {
-            writes.iter().for_each(|&write| add_object(resolver, write));
+            writes.iter().for_each(|&write| add_object(resolver, path, write));
         }
         let colorbar = spec.colorbar.unwrap_or(color_by == ColorBy::AmbientOcclusion);
         let state = resolver.outputs.claim(&format!("{path}.state"), &spec.state, Some("py"))?;
@@ -296,8 +325,8 @@ impl Stage for FigurePlan {
             Some(name) => Some(resolver.outputs.claim(&format!("{path}.screenshot"), name, Some("png"))?),
             None => None,
         };
-        let film = match (&screenshot, writes.iter().find_map(|shown| shown.frames(&resolver.plan))) {
-            (Some(picture), Some((frames, _))) => {
+        let film = match (&screenshot, first) {
+            (Some(picture), Some(Film { frames, .. })) => {
                 let (key, stem) = (format!("{path}.screenshot"), picture.with_extension(""));
                 let stem = stem.to_string_lossy();
                 for i in 0..frames {
@@ -326,7 +355,7 @@ impl Stage for FigurePlan {
         if let Cut::Plane(plane) = cut {
             check_length(&format!("{path}.cut.at"), plane.at)?;
         }
-        Ok(Self { writes, state, screenshot, film, edges, reader, cut, size, style, color_by, colorbar })
+        Ok(Self { writes, state, screenshot, film, edges, slices, reader, cut, size, style, color_by, colorbar })
     }
 
     fn works_on(&self) -> Vec<usize> {
@@ -355,11 +384,11 @@ impl Stage for FigurePlan {
     }
 
     /// Writes the state, if it isn't there already.
-    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
+    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<Told, StageError> {
         let (plan, figure) = (run.plan, &run.plan[me]);
         // Of pieces the first shows the parts of all, where parts are listed.
         if plan.piece.is_some_and(|piece| piece.index() > 0 || !figure.has_parts()) {
-            return Ok("made when the pieces are joined".to_owned());
+            return Ok("made when the pieces are joined".into());
         }
         let state = state(plan, figure)?;
         let path = plan.out.join(&figure.state);
@@ -369,7 +398,7 @@ impl Stage for FigurePlan {
         }
         let bytes = state.len() as u64;
         run.ledger.record(Made { file: &figure.state, bytes, notes: Vec::new(), named: true, unchanged })?;
-        Ok(String::new())
+        Ok(Told::default())
     }
 }
 
@@ -431,7 +460,8 @@ fn with_twins(writes: Vec<Shown>, resolver: &Resolver) -> Vec<Shown> {
         let twin = match shown {
             Shown::Image(_) => Shown::Image(plan.reference(index)?),
             Shown::Animation(_) => Shown::Animation(plan.reference(index)?),
-            Shown::Wireframe(_) | Shown::Slice(_) => return None,
+            Shown::Wireframe(_) => Shown::Wireframe(plan.reference(index)?),
+            Shown::Slice(_) => return None,
         };
         (!writes.contains(&twin)).then_some(twin)
     };
@@ -487,7 +517,8 @@ fn edges(
         resolver.warn(path, "has no use where no edges are drawn");
         return Ok(None);
     }
-    let flat = |w: &Ref<WireframePlan>| plan[plan[*w].scene].dimension == Dimension::Three;
+    // Twins have no w, and are drawn in one colour then.
+    let flat = |w: &Ref<WireframePlan>| plan[plan[*w].scene].dimension == Dimension::Three && !plan.is_twin(w.index());
     if given.color_by == Some(EdgeColor::W)
         && let Some(wireframe) = drawn.iter().find(|w| flat(w))
     {
@@ -511,29 +542,49 @@ fn edges(
     Ok(Some(EdgesPlan { over, color_by, hidden, radius, skin }))
 }
 
-/// Animations in one figure are played together, from their `.vti`.
-fn check_frames(resolver: &Resolver, path: &str, reader: Reader, writes: &[Shown]) -> Result<(), Invalid> {
-    let mut first: Option<(usize, f64)> = None;
+/// Animations in one figure are played together, from their `.vti`, and so are sequences of slices, from their `.vtp`.
+/// Returns the first of them.
+fn check_frames(
+    resolver: &Resolver,
+    path: &str,
+    reader: Reader,
+    writes: &[Shown],
+    slices: Sequence,
+) -> Result<Option<Film>, Invalid> {
+    let mut first: Option<Film> = None;
     for shown in writes {
-        let Some(frames) = shown.frames(&resolver.plan) else { continue };
+        let Some(film) = shown.film(&resolver.plan, slices) else { continue };
         let id = &resolver.plan.stages[shown.index()].id;
-        if reader == Reader::Raw {
+        if reader == Reader::Raw && film.times.is_none() {
             let message = format!("`{id}` is an animation, whose frames are `.vti`; take `reader: vti`");
             return Err(Invalid::new(format!("{path}.reader"), message));
         }
-        let (count, rate) = *first.get_or_insert(frames);
-        if frames != (count, rate) {
-            let message = format!(
+        let message = match &first {
+            None => {
+                first = Some(film);
+                continue;
+            }
+            Some(other) if *other == film => continue,
+            Some(other) if other.times.is_some() != film.times.is_some() => format!(
+                "`{id}` can't be played here: an animation has a time in seconds, and slices have their places for it; make two \
+                 figures, or show `slices: together`"
+            ),
+            Some(other) if other.times.is_some() => format!(
+                "sequences of slices in one figure are played together, so they need the same `range` and `count`: `{id}` has \
+                 others than the one before it"
+            ),
+            Some(other) => format!(
                 "animations in one figure are played together, so they need as many frames at the same rate: `{id}` has {} at \
-                 {} a second, and another {count} at {}",
-                frames.0,
-                number(frames.1),
-                number(rate)
-            );
-            return Err(Invalid::new(format!("{path}.input"), message));
-        }
+                 {} a second, and another {} at {}",
+                film.frames,
+                number(film.rate),
+                other.frames,
+                number(other.rate)
+            ),
+        };
+        return Err(Invalid::new(format!("{path}.input"), message));
     }
-    Ok(())
+    Ok(first)
 }
 
 /// A figure can colour by ambient occlusion only what its files hold.
@@ -552,9 +603,9 @@ fn check_occlusion(resolver: &Resolver, path: &str, reader: Reader, writes: &[Sh
     Ok(())
 }
 
-/// Of several objects each gets a skin of its own, so the file has to tell which voxel is whose, unless it was said what
-/// it holds.
-fn add_object(resolver: &mut Resolver, shown: Shown) {
+/// Of several objects each gets a skin of its own, so the file has to tell which voxel is whose. Where it was said what the
+/// file holds, that is warned of.
+fn add_object(resolver: &mut Resolver, path: &str, shown: Shown) {
     let plan = &mut resolver.plan;
     let Some(render) = shown.render(plan) else { return };
     let volume = plan[render].dimensions[2] > 1;
@@ -562,10 +613,18 @@ fn add_object(resolver: &mut Resolver, shown: Shown) {
     let given = match shown {
         Shown::Image(write) => plan[write].arrays_given,
         Shown::Animation(animation) => plan[animation].arrays_given,
-        Shown::Wireframe(_) | Shown::Slice(_) => true,
+        Shown::Wireframe(_) | Shown::Slice(_) => return,
     };
-    if !volume || !several || given || shown.arrays(plan).contains(&Aov::Object) {
+    if !volume || !several || shown.arrays(plan).contains(&Aov::Object) {
         return;
+    }
+    if given {
+        let message = format!(
+            "shows `{}`, whose arrays lack `object`: its bodies share one skin, and their colours run together where they \
+             meet; add it to its `arrays`",
+            plan.stages[shown.index()].id
+        );
+        return resolver.warn(path, message);
     }
     let write = match shown {
         Shown::Image(write) => write,
@@ -614,7 +673,10 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             Shown::Image(write) => vec![plan[write].files.get(figure.reader.format()).unwrap_or("".as_ref())],
             Shown::Animation(animation) => vec![&plan[animation].list],
             Shown::Wireframe(wireframe) => vec![&plan[wireframe].file],
-            Shown::Slice(slice) => plan[slice].files.iter().map(PathBuf::as_path).collect(),
+            Shown::Slice(slice) => match &plan[slice].list {
+                Some(list) if figure.slices == Sequence::Play => vec![list],
+                _ => plan[slice].files.iter().map(PathBuf::as_path).collect(),
+            },
         };
         let caption = match (figure.writes.len(), dark(write)) {
             (1, _) => String::new(),
@@ -633,10 +695,11 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
         let fits = |wireframe: &Ref<WireframePlan>| {
             matches!(write, Shown::Image(_)) && plan[*wireframe].render().is_some_and(|render| Some(render) == view)
         };
-        let edges = over.filter(fits).map(|wireframe| beside(&figure.state, &plan[wireframe].file));
+        let twin = over.and_then(|over| plan.reference(plan.twin_of(over.index())?));
+        let edges = [over, twin].into_iter().flatten().find(fits);
+        let edges = edges.map(|wireframe| beside(&figure.state, &plan[wireframe].file));
         panels.push(paraview::Panel { kind, files, caption, grid, edges });
     }
-    let frames = figure.writes.iter().find_map(|shown| shown.frames(plan));
     Ok(paraview::state(&paraview::Figure {
         title: plan.name.clone(),
         program: PROGRAM.to_owned(),
@@ -658,7 +721,7 @@ fn state(plan: &Plan, figure: &FigurePlan) -> Result<String, StageError> {
             },
         },
         screenshot: figure.screenshot.as_ref().map(|file| beside(&figure.state, file)),
-        film: frames.map(|(frames, rate)| paraview::Film { frames, rate }),
+        film: figure.writes.iter().find_map(|shown| shown.film(plan, figure.slices)),
         size: figure.size,
         style: match figure.style {
             Style::Surface => paraview::Style::Surface,

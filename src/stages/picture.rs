@@ -77,7 +77,7 @@ impl RenderPlan {
     ) -> Result<Picture, StageError> {
         let render = self;
         let shading = shading(plan, render, scene);
-        let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading)?;
+        let mut picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, shading);
         (picture.visibility, picture.supersample) = (render.visibility, render.supersample);
         picture.layers = render.layers;
         picture.lighting = render.lighting.as_ref().map(LightingPlan::lighting);
@@ -190,13 +190,13 @@ pub(super) fn mark_seen<const D: usize>(
     // All samples, not the voxels' centres alone.
     let samples = |a: usize| if a < D - 1 { render.dimensions[a] * render.supersample } else { 1 };
     let grid = camera.grid(std::array::from_fn(samples));
-    let backend = Arc::clone(scene.session.backend()?);
+    let backend = Arc::clone(scene.session.backend());
     let visibility = render::Visibility::new(backend, &camera, &grid, render.visibility);
     let all = grid.dimensions[2];
     let layers = match part {
         None => 0..all,
         Some(slab) => {
-            let picture = scene.session.renderer(camera, render.dimensions, render::Shading::None)?;
+            let picture = scene.session.renderer(camera, render.dimensions, render::Shading::None);
             let reach = filters::reach(&filters_of(run.plan, render, &picture));
             let looked_at = slab.looked_at(reach, render.dimensions[2]);
             let fine = all / render.dimensions[2];

@@ -19,7 +19,7 @@ use super::scene::ScenePlan;
 use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
 use super::subject::scene_and_occlusion;
 use super::write::{self, Content, PictureFiles, WritePlan, write_whole};
-use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{Invalid, LeftOut, Needs, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told};
 use crate::geometry::Dimension;
 use crate::render::visibility::Method as Visibility;
 use crate::render::{Accuracy, Aov, Audit, CameraError, MOST_LAYERS, MOST_SAMPLES, Shading as Shaded};
@@ -394,10 +394,10 @@ impl Stage for RenderPlan {
     }
 
     /// Makes the picture, if some file of it isn't there yet, and its files with it.
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         if !is_stale(me, plan, &|file| run.is_stale(file)) {
-            return Ok("as it was".to_owned());
+            return Ok("as it was".into());
         }
         let render = &plan[me];
         if let Some(joined) = run.joined.clone() {
@@ -434,16 +434,14 @@ impl Stage for RenderPlan {
             }
             run.made(&file, bytes, notes.clone())?;
         }
-        let rate = made.voxels as f64 / made.rendering.as_secs_f64() / 1e6;
+        let rate = made.voxels as f64 / made.rendering.as_secs_f64();
         let own = made.record.map_or(render.voxels(), |record| {
             (record.layers[1] - record.layers[0]) as u64 * render.voxels() / render.dimensions[2] as u64
         });
-        Ok(format!(
-            "{} of {} voxels see something, {rate:.2} million voxels a second{}",
-            grouped(made.seen),
-            grouped(own),
-            off(made.accuracy)
-        ))
+        let how = format!("{:.2} million voxels a second", rate / 1e6);
+        let mut told = seen(made.seen, own, &how, made.accuracy);
+        told.numbers.insert("voxels_per_second".to_owned(), rate.into());
+        Ok(told)
     }
 }
 
@@ -453,25 +451,24 @@ fn join<const D: usize>(
     joined: &Joined,
     run: &mut Run,
     scene: &SceneRun<D>,
-) -> Result<String, StageError> {
+) -> Result<Told, StageError> {
     let (plan, render, name) = (run.plan, &run.plan[me], format!("render {}", run.plan.id(me)));
     let running = run.progress.stage(&name, render.voxels());
     let grid = render.grid(plan)?;
     let audit = render.audit(plan).map(Audit::<D>::new);
     let made = write::join(me, joined, run, (&grid, scene.session.mesh_hash()), audit, |audit| {
-        Ok(audit.finish(&**scene.session.backend()?, run.progress)?)
+        Ok(audit.finish(&**scene.session.backend(), run.progress)?)
     })?;
     running.end();
     let mut notes: Vec<String> = from_behind(plan.id(me), made.behind, made.seen).into_iter().collect();
     if made.seen == 0 && !scene.session.mesh().simplices.is_empty() {
-        let picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, Shaded::None)?;
+        let picture = scene.session.renderer(camera::camera(&render.camera)?, render.dimensions, Shaded::None);
         notes.push(format!("{name} shows background only: {}", nothing_seen(&picture)));
     }
     for (file, bytes) in made.files {
         run.made(&file, bytes, notes.clone())?;
     }
-    let (seen, voxels, off) = (grouped(made.seen), grouped(render.voxels()), off(made.accuracy));
-    Ok(format!("{seen} of {voxels} voxels see something, joined of {} pieces{off}", joined.count()))
+    Ok(seen(made.seen, render.voxels(), &format!("joined of {} pieces", joined.count()), made.accuracy))
 }
 
 /// What is told of voxels that see a surface from behind.
@@ -486,11 +483,15 @@ fn from_behind(id: &str, behind: u64, seen: u64) -> Option<String> {
     })
 }
 
-/// How far off a picture is, where that is known.
-fn off(accuracy: Option<Accuracy>) -> String {
-    accuracy.map_or(String::new(), |Accuracy { rms, largest, voxels }| {
-        format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest))
-    })
+/// What is told of a picture: how many voxels see something, how it was made, and how far off it is, where that is known.
+fn seen(seen: u64, voxels: u64, how: &str, accuracy: Option<Accuracy>) -> Told {
+    let mut text = format!("{} of {} voxels see something, {how}", grouped(seen), grouped(voxels));
+    let mut numbers = json!({ "seen": seen, "voxels": voxels });
+    if let Some(Accuracy { rms, largest, voxels }) = accuracy {
+        text += &format!(", off by {} ({} at most of {voxels} voxels)", short(rms), short(largest));
+        numbers["off"] = json!({ "rms": rms, "largest": largest, "voxels": voxels });
+    }
+    Told::new(text, numbers)
 }
 
 /// Why nothing is known of the directions in which the sky is open, if so.

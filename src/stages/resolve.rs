@@ -110,7 +110,7 @@ impl Resolver {
 
     /// The place of the twin of the stage at a place, if it has one.
     pub(super) fn twin_of(&self, index: usize) -> Option<usize> {
-        index.checked_sub(1).filter(|&before| self.plan.is_twin(before))
+        self.plan.twin_of(index)
     }
 
     /// The stage's id, or one made up from its kind: `render`, `render-2`, ...

@@ -20,7 +20,7 @@ use super::lighting::{self, SkySpec};
 use super::piece::Piece;
 use super::screen_space::{self, ScreenSpacePlan, ScreenSpaceSpec};
 use super::write::{Encoding, PROGRAM, vti as picture};
-use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, Stage, StageError, Told};
 use crate::geometry::{Dimension, Vector, Vector64, widen};
 use crate::io::{self, AtomicFile, PIPELINE, vti, vtk};
 use crate::occlusion::Cancelled;
@@ -240,16 +240,16 @@ impl Stage for ShadePlan {
         format!("{name}, screen space, {} -> {}", screen_space.line(), file.display())
     }
 
-    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<String, StageError> {
+    fn run_last(me: Ref<Self>, run: &mut Run) -> Result<Told, StageError> {
         let (plan, shade) = (run.plan, &run.plan[me]);
         if !run.is_stale(&shade.file) {
-            return Ok("as it was".to_owned());
+            return Ok("as it was".into());
         }
         if let Some(joined) = &run.joined {
             let (part, path) = (joined.owned(&shade.file, me.nth()), plan.out.join(&shade.file));
             let bytes = picture::take(&part, &path, Encoding::Appended, run.told)?;
             run.made(&shade.file, bytes, Vec::new())?;
-            return Ok("made by one piece".to_owned());
+            return Ok("made by one piece".into());
         }
         // It was read before, but may have changed since.
         let image = shade.read().map_err(|message| Invalid::new(format!("{}.image", plan.path(me)), message))?;
@@ -275,11 +275,14 @@ impl Stage for ShadePlan {
                 grouped(found.seen)
             ));
         }
-        let seen =
-            format!("{} of {} points show something", grouped(found.seen), grouped(image.volume.grid.len() as u64));
+        let (seen, points) = (found.seen, image.volume.grid.len() as u64);
+        let told = Told::new(
+            format!("{} of {} points show something", grouped(seen), grouped(points)),
+            json!({ "seen": seen, "points": points }),
+        );
         let bytes = shade.write(&plan.out.join(&shade.file), run.told, image, found.arrays)?;
         run.made(&shade.file, bytes, notes)?;
-        Ok(seen)
+        Ok(told)
     }
 }
 

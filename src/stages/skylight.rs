@@ -70,7 +70,7 @@ impl<const D: usize> SceneRun<D> {
     ) -> Result<Vec<Vector<D>>, StageError> {
         let _running = run.progress.stage(&format!("directions of {}", run.plan.id(of)), vertices.len() as u64);
         let points: Vec<ShadingPoint<D>> = vertices.into_iter().map(|v| ShadingPoint::Vertex(v as u32)).collect();
-        let backend = self.session.backend()?;
+        let backend = self.session.backend();
         Ok(estimator(of, run).directional(&**backend, &points, None, run.progress)?.vectors)
     }
 

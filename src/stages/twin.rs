@@ -1,8 +1,8 @@
 //! The 3D twin of a scene, for a reader who is to learn to read the 4D picture: `twin: true`.
 //!
 //! The scene one dimension lower ([`crate::scene::twin`]) is a scene of its own, and whatever works on the 4D scene has a
-//! twin that works on it: its occlusion by the same method, its render with the same camera, writes and animations whose
-//! files are called `NAME-3d`. These are stages like any other, each just before the one that it is the twin of, called
+//! twin that works on it: its occlusion by the same method, its render with the same camera, and writes, animations and wireframes
+//! of that, whose files are called `NAME-3d`. These are stages like any other, each just before the one that it is the twin of, called
 //! `ID-3d`, so that later stages may name them; where they name none, the 4D ones are still the nearest. A figure shows each
 //! image of the 4D scene with its twin to the left.
 //!
@@ -15,6 +15,7 @@ use super::lighting::LightSpec;
 use super::occlusion::OcclusionSpec;
 use super::render::RenderSpec;
 use super::scene::SceneSpec;
+use super::wireframe::WireframeSpec;
 use super::write::WriteSpec;
 use super::{Invalid, Plan, StagePlan, StageSpec};
 use crate::scene::{self, place, plane};
@@ -58,6 +59,10 @@ impl StageSpec {
                 Some(input) => Some(StageSpec::Animate(of_animate(spec, input, path)?)),
                 None => None,
             },
+            (StageSpec::Wireframe(spec), StagePlan::Wireframe(plan)) => {
+                let input = plan.render().and_then(|render| twin_of(render.index()));
+                input.map(|input| StageSpec::Wireframe(of_wireframe(spec, input)))
+            }
             _ => None,
         };
         Ok(twin.map(|twin| (named(id), twin)))
@@ -68,6 +73,11 @@ impl Plan {
     /// Whether the stage at this place is the twin of the next.
     pub fn is_twin(&self, index: usize) -> bool {
         self.stages[index].twin
+    }
+
+    /// The place of the twin of the stage at this place, if it has one.
+    pub(super) fn twin_of(&self, index: usize) -> Option<usize> {
+        index.checked_sub(1).filter(|&before| self.is_twin(before))
     }
 }
 
@@ -148,6 +158,10 @@ fn of_write(spec: &WriteSpec, input: String) -> WriteSpec {
     let renamed = |name: &Option<String>| name.as_deref().map(file);
     let (vti, raw, vtu, png) = (renamed(&spec.vti), renamed(&spec.raw), renamed(&spec.vtu), renamed(&spec.png));
     WriteSpec { id: None, input: Some(input), vti, raw, vtu, png, ..spec.clone() }
+}
+
+fn of_wireframe(spec: &WireframeSpec, input: String) -> WireframeSpec {
+    WireframeSpec { id: None, input: Some(input), vtp: file(&spec.vtp), ..spec.clone() }
 }
 
 fn of_animate(spec: &AnimateSpec, input: String, path: &str) -> Result<AnimateSpec, Invalid> {

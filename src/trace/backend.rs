@@ -36,6 +36,12 @@ pub trait RayBackend<const D: usize>: Debug + Send + Sync {
     /// The mesh with its hierarchy, for questions about single simplices.
     fn tracer(&self) -> &Arc<Tracer<D>>;
 
+    /// Makes what [`Self::open_fractions`] needs, on all threads, unless it is there.
+    ///
+    /// # Errors
+    /// [`Error::OpenCl`] if a device fails.
+    fn prepare(&self) -> Result<(), Error>;
+
     /// The simplex that each ray hits first, as [`Tracer::closest_hit`] tells, or [`NOTHING`]. With `after`, one simplex a
     /// ray, the first strictly behind the place where the ray hits that one, as [`Tracer::next_hit`] tells; where it is
     /// [`NOTHING`] the first of all.

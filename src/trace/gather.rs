@@ -124,6 +124,10 @@ pub fn gather<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Vec<Gathered<D>>, Cancelled> {
     assert!(radiosity.is_none_or(|r| r.len() >= tracer.mesh().vertices.len()), "one radiosity a vertex");
+    if radiosity.is_some() {
+        // What rays hit is found one by one.
+        tracer.prepare();
+    }
     tracer.prepare_wide();
     let brightest = radiosity.into_iter().flatten().flatten().fold(0.0f32, |most, &r| most.max(r));
     let radiosity = radiosity.map(|r| (r, f64::from(brightest)));

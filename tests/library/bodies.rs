@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::fs;
 use std::path::Path;
 
 use ao4d::geometry::{Dimension, Vector, Vector64, normal_of};
@@ -623,6 +624,47 @@ fn read_mesh(file: &Path) -> vtk::UnstructuredGrid {
 
 fn array(mesh: &vtk::UnstructuredGrid, name: &str) -> Vec<f64> {
     mesh.point_array(name).unwrap_or_else(|| panic!("no {name}")).values.to_f64()
+}
+
+/// What shows or lights nothing is told, in 3D and 4D, and is no error.
+#[test]
+fn what_meets_nothing_is_told() {
+    for dimension in [3, 4] {
+        let (three, inside, ball) = match dimension {
+            3 => ("dimension: 3, ", "0, 0, -1", "sphere"),
+            _ => ("", "0, 0, 0, -1", "hypersphere"),
+        };
+        let (size, down) = (vec!["5"; dimension - 1].join(", "), vec!["-1"; dimension].join(", "));
+        let folder = tempfile::tempdir().unwrap();
+        let lights = format!(
+            "lights: [{{position: [{inside}]}}, {{direction: [{down}], intensity: 0}}, {{direction: [{down}], color: 0}}]"
+        );
+        let stages = format!(
+            "  - scene: {{{three}objects: [{{{ball}: {{radius: 0.4, subdivisions: 2}}, transform: [{{translate: [{inside}]}}]}}]}}
+  - occlusion: {{samples: 4}}
+  - render: {{id: r, dimensions: [{size}], {lights}}}
+  - write: {{vti: a.vti}}
+  - wireframe: {{id: edges, angle: 90, vtp: e.vtp}}
+  - animate: {{id: film, frames: 1, turn: {{plane: xy}}, vti: f.vti}}
+  - slice: {{id: past, range: [3, 4], count: 3, vtp: past.vtp}}
+  - slice: {{id: by, range: [-1, 4], count: 3, vtp: by.vtp}}
+"
+        );
+        let notes = run_stages(folder.path(), &stages).unwrap();
+        let dark = "reaches nothing that is seen: its intensity or its color is 0";
+        for told in [
+            "lights[0] reaches nothing that is seen: it is inside a body or behind one".to_owned(),
+            format!("lights[1] {dark}"),
+            format!("lights[2] {dark}"),
+            "edges: there are no such edges".to_owned(),
+            "past: no hyperplane meets anything; all files are empty".to_owned(),
+        ] {
+            assert_eq!(notes.iter().filter(|note| note.contains(&told)).count(), 1, "{dimension}D, {told}: {notes:?}");
+        }
+        assert!(!notes.iter().any(|note| note.starts_with("by")), "{notes:?}");
+        assert!(folder.path().join("f_0000.vti").is_file() && !folder.path().join("f_0001.vti").exists());
+        assert_eq!(fs::read_to_string(folder.path().join("f.pvd")).unwrap().matches("<DataSet").count(), 1);
+    }
 }
 
 #[test]

@@ -145,11 +145,11 @@ fn on_processors() {
 fn on_devices() {
     let opencl = OpenCl::open(&[]).unwrap();
     let device = |tracer: &Arc<Tracer<3>>| -> (String, Box<dyn RayBackend<3>>) {
-        ("OpenCL".into(), Box::new(OpenClBackend::new(&opencl, Arc::clone(tracer)).unwrap()))
+        ("OpenCL".into(), Box::new(OpenClBackend::new(&opencl, Arc::clone(tracer))))
     };
     table::<3>(|tracer| [processors(tracer), vec![device(tracer)]].into_iter().flatten().collect());
     let device = |tracer: &Arc<Tracer<4>>| -> (String, Box<dyn RayBackend<4>>) {
-        ("OpenCL".into(), Box::new(OpenClBackend::new(&opencl, Arc::clone(tracer)).unwrap()))
+        ("OpenCL".into(), Box::new(OpenClBackend::new(&opencl, Arc::clone(tracer))))
     };
     table::<4>(|tracer| [processors(tracer), vec![device(tracer)]].into_iter().flatten().collect());
 }

@@ -146,7 +146,7 @@ fn soups<const D: usize>(opencl: &OpenCl) {
         let mesh = soup::<D>(&mut random, count, size, step, factor, offset);
         let tracer = Arc::new(Tracer::new(mesh));
         let mesh = tracer.mesh();
-        let device = OpenClBackend::new(opencl, tracer.clone()).unwrap();
+        let device = OpenClBackend::new(opencl, tracer.clone());
         let name = format!("{D}D, {count} simplices, step {step}, times {factor:e}, plus {offset:e}");
         let mut points = ShadingPoint::vertices(mesh);
         for simplex in 0..mesh.simplices.len() as u32 {
@@ -214,8 +214,8 @@ fn directions_are_made_there_and_few_rays_are_left_here() {
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let mesh = soup::<4>(&mut random, 2000, 0.1, 0.0, 1.0, 0.0);
     let tracer = Arc::new(Tracer::new(mesh));
-    let device = OpenClBackend::new(&opencl, tracer.clone()).unwrap();
-    assert!(device.makes_directions());
+    let device = OpenClBackend::new(&opencl, tracer.clone());
+    assert!(device.makes_directions().unwrap());
     let sampling = Sampling::new(64, 5);
     let points: Vec<ShadingPoint<4>> = (0..8000).map(ShadingPoint::Vertex).collect();
     let first = device.open_fractions(&points, &sampling, &Silent).unwrap();
@@ -228,7 +228,7 @@ fn directions_are_made_there_and_few_rays_are_left_here() {
     assert_eq!(first, backwards);
     // And by two devices together, or one opened twice.
     let two = OpenCl::open(&[(0, 0), (0, 0)]).unwrap();
-    let device = OpenClBackend::new(&two, tracer.clone()).unwrap();
+    let device = OpenClBackend::new(&two, tracer.clone());
     assert_eq!(first, device.open_fractions(&points, &sampling, &Silent).unwrap());
     let mesh = tracer.mesh();
     let ray = |k: usize| Ray::new(mesh.vertices[k], mesh.vertices[(k * 7 + 1) % 8000] - mesh.vertices[k]);
@@ -255,7 +255,7 @@ fn it_can_be_stopped() {
     let opencl = OpenCl::open(&[]).unwrap();
     let mesh = soup::<4>(&mut ChaCha8Rng::seed_from_u64(1), 100, 0.2, 0.0, 1.0, 0.0);
     let points = ShadingPoint::vertices(&mesh);
-    let device = OpenClBackend::new(&opencl, Tracer::new(mesh)).unwrap();
+    let device = OpenClBackend::new(&opencl, Tracer::new(mesh));
     let stopped = Estimator::Sampled(Sampling::new(64, 5)).estimate(&device, &points, None, &Stop);
     assert_eq!(stopped, Err(ao4d::occlusion::Error::Cancelled));
     let ray = Ray::new(Vector::zeros(), Vector::from_element(0.5));

@@ -521,7 +521,14 @@ fn edges_are_tubes_beside_volumes_and_over_them() {
     let ball = count(&panel(&same, 0), |c| grey(c) && c[0] > 180 && c[0] < 252);
     assert!(ball > 8000, "the skin is not seen: {ball}");
     // By depth: dark blue on the left, pale blue on the right.
-    let by_depth = draw_with(Hidden::LeaveOut, Some("depth"));
+    figure.size = None; // as panels of all kinds need
+    let by_depth = {
+        figure.tubes = Some(Tubes { color_by: Some("depth"), hidden: Hidden::LeaveOut, radius: Some(0.03), skin: 0.3 });
+        write_state(folder.path(), &figure);
+        draw("pvbatch", &[Path::new("figure.py")], folder.path());
+        Picture::read(&folder.path().join("figure.png"))
+    };
+    assert_eq!(by_depth.width, 3198);
     let blue: Vec<_> = panel(&by_depth, 1).into_iter().filter(|p| i32::from(p.1[2]) - i32::from(p.1[0]) > 30).collect();
     let place = |deep: bool| {
         let some: Vec<f64> = blue.iter().filter(|p| (p.1[0] < 40) == deep).map(|p| p.0[0]).collect();
@@ -590,7 +597,7 @@ fn an_animation_has_a_picture_a_frame_and_a_film_where_ffmpeg_is() {
     }
     let names = list.iter().map(|(time, name)| (*time, name.as_str()));
     ao4d::io::pvd::write(fs::File::create(folder.path().join("a.pvd")).unwrap(), names).unwrap();
-    let film = Some(ao4d::io::paraview::Film { frames: 3, rate: 8.0 });
+    let film = Some(ao4d::io::paraview::Film { frames: 3, rate: 8.0, times: None });
     let figure = Figure { film, size: Some([301, 280]), ..surface(&[("a.pvd", "", &frames[0])]) };
     write_state(folder.path(), &figure);
     // A stand-in for ffmpeg, which notes what it is asked for; and none.
@@ -624,4 +631,41 @@ fn an_animation_has_a_picture_a_frame_and_a_film_where_ffmpeg_is() {
     assert!(red[1] - red[0] > 0.05 && red[2] - red[1] > 0.05, "{red:?}");
     assert!(places.iter().all(|place| (place[1][0] - places[0][1][0]).abs() < 0.01), "{places:?}");
     assert!(picture("figure.png") == picture("figure_0000.png"), "the picture is the first frame");
+}
+
+/// Slices that are played: each at its time, which stands below it, the empty ones too, all seen from the same place.
+#[test]
+#[ignore = "needs ParaView: run tests/all"]
+fn a_sequence_of_slices_is_played() {
+    let folder = scratch();
+    let arrays = r#"<PointData><DataArray type="UInt16" Name="object" format="ascii">1 1 1 1</DataArray></PointData>"#;
+    let names = ["s-0.vtp", "s-1.vtp", "s-2.vtp"];
+    for (name, x) in [(names[1], 0.0), (names[2], 3.0)] {
+        let square = [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x + 1.0, 1.0, 0.5], [x, 1.0, 0.5]];
+        write_polydata(&folder.path().join(name), &square, &[vec![0, 1, 2], vec![0, 2, 3]], arrays);
+    }
+    let empty = r#"<?xml version="1.0"?>
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"><PolyData>
+<Piece NumberOfPoints="0" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="0">
+<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii"></DataArray></Points></Piece></PolyData></VTKFile>"#;
+    fs::write(folder.path().join(names[0]), empty).unwrap();
+    let times = vec![-0.5, 0.25, 1.0];
+    let list = fs::File::create(folder.path().join("s.pvd")).unwrap();
+    ao4d::io::pvd::write(list, times.iter().copied().zip(names)).unwrap();
+    let panel =
+        Panel { kind: Kind::Slices, files: vec!["s.pvd".into()], caption: String::new(), grid: None, edges: None };
+    let film = Some(ao4d::io::paraview::Film { frames: 3, rate: 8.0, times: Some(times) });
+    let cut = Cut::Octant { corner: None };
+    let figure = Figure { film, cut, panels: vec![panel], size: Some([600, 500]), ..surface(&[]) };
+    write_state(folder.path(), &figure);
+    draw("pvbatch", &[Path::new("figure.py")], folder.path());
+    let blue = |c: [u8; 3]| c[2] > c[0] && c[2] > 120 && c[0] > 40;
+    let frame = |k: usize| Picture::read(&folder.path().join(format!("figure_{k:04}.png")));
+    let seen = |k: usize, from: f64, to: f64| count(&frame(k).part([from, to], [0.1, 0.85]), blue);
+    assert_eq!((seen(0, 0.0, 1.0), seen(1, 0.6, 1.0), seen(2, 0.0, 0.4)), (0, 0, 0));
+    let (left, right) = (seen(1, 0.0, 0.4), seen(2, 0.6, 1.0));
+    assert!(left > 2000 && right > 2000, "{left} {right}");
+    // Where it is, in black.
+    let dark = |k: usize| count(&frame(k).part([0.3, 0.7], [0.88, 1.0]), |c| c[0] < 80 && c[2] < 80);
+    assert!((0..3).all(|k| dark(k) > 40), "{:?}", [0, 1, 2].map(dark));
 }

@@ -1,7 +1,7 @@
 //! What the documents show runs: each of their pipelines, and each part of one within a small pipeline, is checked.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What parts of pipelines stand in.
@@ -41,6 +41,77 @@ fn pipeline(block: &str) -> Option<String> {
         Some(format!("name: scene\nseed: 1\nstages:\n  - scene:\n{inner}"))
     } else {
         None
+    }
+}
+
+/// What a heading is called in links, as hosts of repositories and mdBook call it.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim().chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '_' | ' '));
+    kept.collect::<String>().to_lowercase().replace(' ', "-")
+}
+
+/// A document without its blocks of code.
+fn prose(text: &str) -> String {
+    text.split("```").step_by(2).collect()
+}
+
+/// Where a document's links lead.
+fn links(text: &str) -> Vec<String> {
+    let after = text.split("](").skip(1).filter_map(|rest| rest.split_once(')'));
+    after.map(|(to, _)| to.to_owned()).filter(|to| !to.contains("://") && !to.contains(' ')).collect()
+}
+
+/// All documents of the repository, but those of what is built.
+fn documents(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap()) {
+        let (path, name) = (entry.path(), entry.file_name().into_string().unwrap());
+        if entry.file_type().unwrap().is_dir() {
+            if !name.starts_with('.') && name != "target" && name != "out" {
+                documents(&path, found);
+            }
+        } else if name.ends_with(".md") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn every_link_of_the_documents_leads_somewhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut all = Vec::new();
+    documents(root, &mut all);
+    let (mut followed, mut wrong) = (0, Vec::new());
+    for document in &all {
+        let text = prose(&fs::read_to_string(document).unwrap());
+        for to in links(&text) {
+            let (path, part) = to.split_once('#').unwrap_or((&to, ""));
+            let target = if path.is_empty() { document.clone() } else { document.parent().unwrap().join(path) };
+            followed += 1;
+            let known = || {
+                let text = prose(&fs::read_to_string(&target).unwrap());
+                let mut headings = text.lines().filter(|line| line.starts_with('#'));
+                headings.any(|line| anchor(line.trim_start_matches('#')) == part)
+                    || text.contains(&format!("id=\"{part}\""))
+            };
+            if !target.exists() || !part.is_empty() && !known() {
+                wrong.push(format!("{}: {to}", document.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(followed > 100, "only {followed} links");
+}
+
+/// Every page of docs/ is one of the book.
+#[test]
+fn the_book_has_every_page() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let listed = links(&fs::read_to_string(docs.join("SUMMARY.md")).unwrap());
+    let mut pages = Vec::new();
+    documents(&docs, &mut pages);
+    for page in pages {
+        let name = page.file_name().unwrap().to_str().unwrap().to_owned();
+        assert!(name == "SUMMARY.md" || listed.contains(&name), "{name} is not in SUMMARY.md");
     }
 }
 

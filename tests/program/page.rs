@@ -71,6 +71,23 @@ fn count(seen: &(Vec<[u8; 3]>, usize), main: usize) -> usize {
 }
 
 #[test]
+fn what_ambient_occlusion_darkens_is_opened_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = "  - render: {id: plain, occlusion: none, dimensions: [4, 4, 4]}\n  - write: {vti: plain.vti}\n";
+    let whole = PIPELINE.replace("  - render", &format!("{plain}  - render"));
+    for (text, order) in [
+        (format!("{whole}  - page: {{html: page.html}}\n"), "turn, both, plain -> page.html"),
+        (format!("{whole}  - page: {{html: page.html, input: [plain, both]}}\n"), "plain, both -> page.html"),
+    ] {
+        std::fs::write(folder.path().join("p.yaml"), text).unwrap();
+        let command =
+            Command::new(env!("CARGO_BIN_EXE_ao4d")).current_dir(folder.path()).args(["check", "p.yaml"]).output();
+        let told = String::from_utf8(command.unwrap().stdout).unwrap();
+        assert!(told.contains(order), "{told}");
+    }
+}
+
+#[test]
 #[ignore = "needs Chromium: tests/install"]
 fn a_browser_shows_the_page() {
     let folder = tempfile::tempdir().unwrap();

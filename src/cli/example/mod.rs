@@ -6,9 +6,11 @@
 
 mod shipped;
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::{Arg, Args, Command};
 
 use super::console::Console;
 use super::{Failure, Outcome};
@@ -21,6 +23,7 @@ const SCHEMA: &str = "ao4d.schema.json";
 #[derive(Args, Debug)]
 pub struct Example {
     /// Which one, such as two_tetrahedra or lessons/02_cube; `all` for all of them; lists them if left out
+    #[arg(value_parser = Names, hide_possible_values = true)]
     name: Option<String>,
     /// Write it into this folder
     #[arg(long, value_name = "DIR", default_value = ".")]
@@ -28,6 +31,23 @@ pub struct Example {
     /// Write over files that are there already
     #[arg(long)]
     force: bool,
+}
+
+/// The names that shells complete. Others are taken too: parts of them, and with hyphens.
+#[derive(Clone)]
+struct Names;
+
+impl TypedValueParser for Names {
+    type Value = String;
+
+    fn parse_ref(&self, command: &Command, argument: Option<&Arg>, value: &OsStr) -> Result<String, clap::Error> {
+        StringValueParser::new().parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let names = PIPELINES.iter().map(|(name, _)| *name).chain(["all"]);
+        Some(Box::new(names.map(PossibleValue::new)))
+    }
 }
 
 impl Example {

@@ -129,6 +129,7 @@ fn of_mesh<const D: usize>(
     progress: &dyn Progress,
 ) -> Result<Option<Study>, RunError> {
     let tracer = Arc::new(Tracer::new(mesh));
+    tracer.prepare();
     tracer.prepare_wide();
     let mesh = tracer.mesh();
     let Some(bench) = Bench::new(Arc::clone(&tracer), seed) else { return Ok(None) };

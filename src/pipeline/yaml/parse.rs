@@ -4,7 +4,7 @@
 //! ([`Spanned`]). What is decided here: which of its limits hold, that keys stand once (with both lines
 //! told), and how its complaints are worded.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -37,6 +37,7 @@ pub fn parse(text: &str) -> Result<Node, Problem> {
         alias_limits: serde_saphyr::alias_limits! { max_total_replayed_events: MAX_COPIED },
         // The tree keeps both, so that the complaint can name both lines.
         duplicate_keys: DuplicateKeyPolicy::PassThrough,
+        // They are merged in the tree, where what stands twice is known.
         merge_keys: MergeKeyPolicy::AsOrdinary,
         // Whoever wants a number refuses those that are not finite.
         non_finite_float_policy: NonFiniteFloatPolicy::PassThrough,
@@ -46,8 +47,9 @@ pub fn parse(text: &str) -> Result<Node, Problem> {
         underscored_numbers_as_strings: true,
         with_snippet: false,
     };
-    let root: Node = serde_saphyr::from_str_with_options(text, options).map_err(|e| refusal(text, &e))?;
+    let mut root: Node = serde_saphyr::from_str_with_options(text, options).map_err(|e| refusal(text, &e))?;
     keys_stand_once(&root)?;
+    take_over(&mut root)?;
     Ok(root)
 }
 
@@ -146,6 +148,39 @@ fn keys_stand_once(node: &Node) -> Result<(), Problem> {
     Ok(())
 }
 
+/// The key that takes over the entries of other mappings, as in `<<: *shared`.
+const TAKES_OVER: &str = "<<";
+
+/// Gives each mapping the entries of those that its `<<` names: one, or a list of them. What it has itself wins, then what
+/// comes first. Recursion is bounded by [`MAX_DEPTH`], and what aliases copy by [`MAX_COPIED`].
+fn take_over(node: &mut Node) -> Result<(), Problem> {
+    match &mut node.value {
+        Value::List(items) => items
+            .iter_mut()
+            .enumerate()
+            .try_for_each(|(i, item)| take_over(item).map_err(|problem| problem.inside(Segment::Index(i)))),
+        Value::Map(entries) => {
+            for Entry { key, value, .. } in entries.iter_mut() {
+                take_over(value).map_err(|problem| problem.inside(Segment::Key(key.clone())))?;
+            }
+            let Some(at) = entries.iter().position(|entry| entry.key == TAKES_OVER) else { return Ok(()) };
+            let Entry { value: named, .. } = entries.remove(at);
+            let origin = named.origin;
+            let named = if let Value::List(items) = named.value { items } else { vec![named] };
+            for one in named {
+                let Value::Map(theirs) = one.value else {
+                    let message = "takes over the keys of a mapping, `<<: *name`, or of a list of mappings";
+                    return Err(Problem::new(message).or_at(origin).inside(Segment::Key(TAKES_OVER.to_owned())));
+                };
+                let known: BTreeSet<String> = entries.iter().map(|entry| entry.key.clone()).collect();
+                entries.extend(theirs.into_iter().filter(|entry| !known.contains(&entry.key)));
+            }
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The first character that fits, and where it is.
 fn position_of(text: &str, fits: impl Fn(char) -> bool) -> Option<(Origin, char)> {
     let at = text.find(&fits)?;
@@ -236,6 +271,31 @@ mod tests {
             assert!(refusal.contains(part), "{text:?}: {refusal}");
             assert!(refusal.contains(&format!("line: {line},")), "{text:?}: {refusal}");
         }
+    }
+
+    #[test]
+    fn mappings_take_over_what_others_have() {
+        let text = "x-a: &a {p: 1, q: 1, r: {s: 1}}\nx-b: &b {<<: *a, q: 2}\none: {<<: *a, p: 3}\nmany: {q: 4, <<: [{t: 5}, *b]}\n";
+        let root = parse(text).unwrap();
+        let of = |key: &str| -> Vec<String> {
+            let Value::Map(entries) = &root.get(key).unwrap().value else { panic!("{key}") };
+            entries.iter().map(|entry| format!("{}={:?}", entry.key, entry.value.value)).collect()
+        };
+        let same = |text: &str| {
+            let root = parse(text).unwrap();
+            let Value::Map(entries) = root.value else { panic!("{text}") };
+            entries.iter().map(|entry| format!("{}={:?}", entry.key, entry.value.value)).collect::<Vec<_>>()
+        };
+        // Places are those of the values themselves; what is compared here has none but in `r`.
+        assert_eq!(of("one")[..2], same("{p: 3, q: 1}"));
+        assert_eq!(of("many")[..3], same("{q: 4, t: 5, p: 1}"));
+        assert!(of("one").len() == 3 && of("many").len() == 4 && of("x-b").len() == 3);
+        let taken = root.get("one").unwrap().get("q").unwrap();
+        assert_eq!(taken.origin, Origin::File { line: 1, column: 19 }, "where it must be mended");
+        for text in ["a: {<<: 3}\n", "a: {<<: [{b: 1}, 2]}\n", "a: {<<: }\n"] {
+            assert!(refusal(text).contains("takes over the keys of a mapping"), "{text}");
+        }
+        assert!(refusal("a: &a {}\nb: {<<: *a, <<: *a}\n").contains("`<<` stands twice"));
     }
 
     #[test]

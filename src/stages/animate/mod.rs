@@ -27,7 +27,9 @@ use super::piece::Piece;
 use super::render::{RenderPlan, Shading};
 use super::scene::{Bodies, ScenePlan};
 use super::write::{self, Compression, Encoding, Files, Format, PictureFiles, WritePlan};
-use super::{Invalid, Keys, LeftOut, Needs, OneOrMany, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{
+    Invalid, Keys, LeftOut, Needs, OneOrMany, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told,
+};
 use super::{names, suggest};
 use crate::io::{self, AtomicFile, pvd};
 use crate::occlusion::Cancelled;
@@ -339,7 +341,7 @@ impl Stage for AnimatePlan {
         }
     }
 
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         let animation = &plan[me];
         let stale: Vec<usize> = (0..animation.files.len()).filter(|&i| run.is_stale(&animation.files[i])).collect();
@@ -387,17 +389,21 @@ impl Stage for AnimatePlan {
             run.made(&animation.list, bytes, Vec::new())?;
         }
         if stale.is_empty() {
-            return Ok("as it was".to_owned());
+            return Ok("as it was".into());
         }
         if let Some(joined) = &run.joined {
-            return Ok(format!("{} of {} frames, of {} pieces", stale.len(), animation.files.len(), joined.count()));
+            let text = format!("{} of {} frames, of {} pieces", stale.len(), animation.files.len(), joined.count());
+            return Ok(Told::new(text, json!({ "made": stale.len(), "frames": animation.files.len() })));
         }
-        let rate = made.voxels as f64 / made.rendering.as_secs_f64() / 1e6;
+        let rate = made.voxels as f64 / made.rendering.as_secs_f64();
         let rays = match made.rays {
             0 => String::new(),
             rays => format!(", {} rays for occlusion at vertices, anew in each frame", grouped(rays)),
         };
-        Ok(format!("{} of {} frames, {rate:.2} million voxels a second{rays}", stale.len(), animation.files.len()))
+        let (new, frames) = (stale.len(), animation.files.len());
+        let text = format!("{new} of {frames} frames, {:.2} million voxels a second{rays}", rate / 1e6);
+        let numbers = json!({ "made": new, "frames": frames, "voxels_per_second": rate, "rays": made.rays });
+        Ok(Told::new(text, numbers))
     }
 }
 

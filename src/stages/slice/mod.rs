@@ -26,7 +26,7 @@ use super::projection::{ProjectionWord, StereographicPlan};
 use super::scene::ScenePlan;
 use super::subject::scene_and_occlusion;
 use super::write::vtu;
-use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told};
 use crate::geometry::Dimension;
 use crate::io::{self, AtomicFile, pvd};
 use crate::mesh::section::section;
@@ -183,7 +183,7 @@ impl Stage for SlicePlan {
         format!("{} {with}, {}, {places}{shown} -> {}", plan.id(*scene), level.line(), file.display())
     }
 
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         let Self { occlusion, level: cut, stereographic, places, files, list, .. } = &plan[me];
         let stale: Vec<usize> = (0..files.len()).filter(|&i| run.is_stale(&files[i])).collect();
@@ -192,7 +192,7 @@ impl Stage for SlicePlan {
         }
         let values = occlusion.and_then(|occlusion| scene.values.get(&occlusion)).map(|values| &**values);
         let mesh = scene.session.mesh();
-        let mut faces = 0;
+        let (mut faces, mut met) = (0, false);
         for &i in &stale {
             let file = &files[i];
             let shown = match stereographic {
@@ -212,8 +212,12 @@ impl Stage for SlicePlan {
             };
             faces += found.faces.len();
             let mut notes = Vec::new();
-            if found.faces.is_empty() && list.is_none() {
+            met |= !found.faces.is_empty();
+            // Of a sequence some may go past; where all do, the last one tells.
+            let all = !met && stale.len() == files.len() && i + 1 == files.len();
+            if found.faces.is_empty() && (list.is_none() || all) {
                 let what = match cut {
+                    LevelPlan::Across(_) | LevelPlan::W if all => "no hyperplane meets anything; all files are empty",
                     LevelPlan::Across(_) | LevelPlan::W => "the hyperplane meets nothing; the file is empty",
                     LevelPlan::Hopf { .. } => {
                         "the torus meets nothing; the file is empty. Is `center` within the body?"
@@ -237,7 +241,10 @@ impl Stage for SlicePlan {
             Dimension::Three => "lines",
             Dimension::Four => "triangles",
         };
-        Ok(if stale.is_empty() { "as it was".to_owned() } else { format!("{faces} {what}") })
+        Ok(match stale.is_empty() {
+            true => "as it was".into(),
+            false => Told::new(format!("{faces} {what}"), json!({ what: faces })),
+        })
     }
 }
 

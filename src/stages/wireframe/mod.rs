@@ -20,7 +20,7 @@ use super::range::positive;
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
 use super::write::vtu;
-use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told};
 use crate::io;
 use crate::mesh::edges;
 use crate::text::number;
@@ -215,11 +215,11 @@ impl Stage for WireframePlan {
         format!("{}, {which}, {how} -> {}", plan.id(*scene), file.display())
     }
 
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         let Self { view, angle, file, .. } = &plan[me];
         if !run.is_stale(file) {
-            return Ok("as it was".to_owned());
+            return Ok("as it was".into());
         }
         let mesh = scene.session.mesh();
         let which = angle.map_or(edges::Edges::All, edges::Edges::Feature);
@@ -230,14 +230,14 @@ impl Stage for WireframePlan {
                 let mut lines = Lines::seen(mesh, &camera, *near, &edges);
                 if *hidden != Hidden::Ignore && !lines.lines.is_empty() {
                     let voxel = camera.grid(*dimensions).spacing[1];
-                    let backend = scene.session.backend()?;
+                    let backend = scene.session.backend();
                     lines.look(&**backend, &camera, voxel, *hidden == Hidden::LeaveOut, run.progress)?;
                 }
                 lines
             }
             View::Stereographic(projection) => {
                 // The checks before leave no projection that can't be.
-                let Some(map) = projection.map::<D>() else { return Ok(String::new()) };
+                let Some(map) = projection.map::<D>() else { return Ok(Told::default()) };
                 Lines::projected(mesh, &map, &edges)
                     .map_err(|(why, object)| projection.complain(me, plan, why, &mesh.objects[object as usize].name))?
             }
@@ -255,7 +255,8 @@ impl Stage for WireframePlan {
             0 => String::new(),
             hidden => format!(", {hidden} of them hidden"),
         };
-        Ok(format!("{} lines{hidden}", lines.lines.len()))
+        let numbers = json!({ "lines": lines.lines.len(), "hidden": lines.hidden() });
+        Ok(Told::new(format!("{} lines{hidden}", lines.lines.len()), numbers))
     }
 }
 

@@ -27,7 +27,7 @@ use super::picture::array_bytes;
 use super::piece::{self, Piece};
 use super::render::RenderPlan;
 use super::scene::ScenePlan;
-use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError};
+use super::{Invalid, Keys, LeftOut, Needs, Output, Plan, Ref, Resolver, Run, SceneRun, Stage, StageError, Told};
 use crate::geometry::{Dimension, Vector};
 use crate::io::{AtomicFile, Error};
 use crate::mesh::Mesh;
@@ -619,7 +619,7 @@ impl Stage for WritePlan {
     }
 
     /// Writes meshes. Pictures were written with the render.
-    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<String, StageError> {
+    fn run<const D: usize>(me: Ref<Self>, run: &mut Run, scene: &mut SceneRun<D>) -> Result<Told, StageError> {
         let plan = run.plan;
         let write = &plan[me];
         if let Some(piece) = plan.piece {
@@ -653,7 +653,7 @@ impl Stage for WritePlan {
             );
             run.made(path, bytes, (left_out > 0).then_some(note).into_iter().collect())?;
         }
-        Ok(String::new())
+        Ok(Told::default())
     }
 }
 

@@ -52,6 +52,11 @@ impl<const D: usize> RayBackend<D> for CpuBackend<D> {
         &self.tracer
     }
 
+    fn prepare(&self) -> Result<(), Error> {
+        self.tracer.prepare_wide();
+        Ok(())
+    }
+
     fn first_hits(&self, rays: &[Ray<D>], after: Option<&[u32]>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         Ok(scalar::first_hits(&self.tracer, rays, after, progress)?)
     }

@@ -22,6 +22,7 @@ pub(super) fn open_fractions<const D: usize>(
     sampling: &Sampling,
     progress: &dyn Progress,
 ) -> Result<Vec<Estimate>, Cancelled> {
+    tracer.prepare();
     tracer.prepare_wide();
     // What takes nothing is hit by packets all the same, and counts at vertices for the ways they are approached.
     let has_nothing = tracer.mesh().objects.iter().any(|object| object.opacity <= 0.0);

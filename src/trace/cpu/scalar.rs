@@ -77,6 +77,11 @@ impl<const D: usize> RayBackend<D> for ScalarBackend<D> {
         &self.tracer
     }
 
+    fn prepare(&self) -> Result<(), Error> {
+        self.tracer.prepare();
+        Ok(())
+    }
+
     fn first_hits(&self, rays: &[Ray<D>], after: Option<&[u32]>, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         Ok(first_hits(&self.tracer, rays, after, progress)?)
     }

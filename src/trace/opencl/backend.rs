@@ -1,7 +1,7 @@
 //! A mesh on devices, and first hits there.
 
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
@@ -10,6 +10,8 @@ use super::devices::Kind;
 use super::error::Error;
 use super::layout::{self, Float4};
 use super::open::OpenCl;
+use super::program::{PIECES, Shape};
+use super::wide::Wide;
 use crate::accel::{Scale, Tracer};
 use crate::geometry::{Cone, Frame, Ray, Vector};
 use crate::progress::{Cancelled, Progress};
@@ -19,9 +21,6 @@ use crate::trace::estimate::Estimate;
 use crate::trace::point::ShadingPoint;
 use crate::trace::sampling::{Sampler, Sampling, Sequence, Source, sobol_matrices};
 
-/// What boxes grow by on each side, in widths of the scene, beside the rounding of that: far more than what
-/// `inverted` of the kernels moves a ray by, and so little that it only matters around 0.
-const GROWTH: f32 = 1e-18;
 /// Rays of a launch to begin with.
 const RAYS: usize = 1 << 17;
 /// The most rays of a launch.
@@ -29,16 +28,34 @@ pub(super) const MOST_RAYS: usize = 1 << 21;
 /// Seconds that a launch may take: long enough to be worth it, short enough for watchdogs.
 const LAUNCH: f64 = 0.06;
 
-/// A mesh with its hierarchy on one device or several. It owns what it needs, and can be kept in anything.
+/// A mesh with its hierarchy on one device or several. It owns what it needs, and can be kept in anything. The devices get the
+/// mesh when rays are first asked for: a picture that is only scan-converted needs none.
 #[derive(Debug)]
 pub struct OpenClBackend<const D: usize> {
-    pub(super) parts: Vec<Part>,
+    opencl: OpenCl,
+    tuning: Tuning,
     pub(super) tracer: Arc<Tracer<D>>,
     pub(super) scale: Scale<D>,
-    /// Whether scaled coordinates lose nothing. If they do, the device isn't asked.
-    pub(super) serves: bool,
+    scene: OnceLock<Result<Scene, Error>>,
     /// Rays that the devices left to the host.
     pub(super) settled: AtomicU64,
+}
+
+/// What is otherwise chosen by the device, for tests.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tuning {
+    /// The most simplices in one piece of memory.
+    piece: Option<usize>,
+    /// Whether the rays of a group are sorted.
+    sorted: Option<bool>,
+}
+
+/// The mesh on the devices.
+#[derive(Debug)]
+pub(super) struct Scene {
+    pub parts: Vec<Part>,
+    /// Whether scaled coordinates lose nothing. If they do, the device isn't asked.
+    pub serves: bool,
 }
 
 /// A device with the mesh on it.
@@ -54,15 +71,26 @@ pub(super) struct Part {
 #[derive(Debug)]
 pub(super) struct OnDevice {
     pub kernels: Kernels,
-    pub nodes: Memory<layout::Node>,
-    pub corners: Memory<Float4>,
-    pub simplices: Memory<u32>,
+    nodes: Memory<layout::Node>,
+    /// Of the simplices, piece after piece.
+    corners: Vec<Memory<Float4>>,
+    simplices: Memory<u32>,
     pub matrices: Memory<u32>,
+    is_empty: bool,
     /// How many rays a launch takes now.
     pub rays: usize,
 }
 
 impl OnDevice {
+    /// What kernels are told of the mesh.
+    pub fn mesh(&self) -> Vec<Argument<'_>> {
+        let mut arguments = vec![self.nodes.argument()];
+        // Pieces that there aren't are never looked at.
+        arguments.extend((0..PIECES).map(|piece| self.corners[piece.min(self.corners.len() - 1)].argument()));
+        arguments.extend([self.simplices.argument(), Argument::U32(u32::from(self.is_empty))]);
+        arguments
+    }
+
     /// Takes more or fewer rays the next time, after so many took so long.
     pub fn learn(&mut self, rays: usize, seconds: f64) {
         let right = rays as f64 * (LAUNCH / seconds.max(1e-6)).clamp(0.25, 2.0);
@@ -78,52 +106,56 @@ pub(super) fn float4<const D: usize>(v: &Vector<D>) -> Float4 {
     Float4(all)
 }
 
-impl<const D: usize> OpenClBackend<D> {
+impl Scene {
     /// Brings the mesh and its hierarchy to the devices, and compiles the kernels for them.
-    ///
-    /// # Errors
-    /// [`Error`] if the device has not enough memory or the kernels don't compile.
-    pub fn new(opencl: &OpenCl, tracer: impl Into<Arc<Tracer<D>>>) -> Result<Self, Error> {
-        let tracer = tracer.into();
+    fn new<const D: usize>(
+        opencl: &OpenCl,
+        tracer: &Tracer<D>,
+        scale: &Scale<D>,
+        tuning: Tuning,
+    ) -> Result<Self, Error> {
         tracer.prepare();
-        let (mesh, bvh) = (tracer.mesh(), tracer.bvh());
-        let scale = Scale::of(&mesh.vertices);
-        let serves = mesh.vertices.par_iter().all(|v| is_exact(&scale, v));
-        let nodes: Vec<layout::Node> = (bvh.nodes.par_iter())
-            .map(|node| {
-                let low = scale.scaled(&node.bounds.min).map(|x| x.next_down() - GROWTH);
-                let high = scale.scaled(&node.bounds.max).map(|x| x.next_up() + GROWTH);
-                let (low, high) = (float4(&low), float4(&high));
-                layout::Node { low, high, first: node.first, count: node.count, padding: [0; 2] }
-            })
-            .collect();
+        let mesh = tracer.mesh();
+        let serves = mesh.vertices.par_iter().all(|v| is_exact(scale, v));
+        let wide = Wide::new(tracer.bvh(), scale);
         let corners: Vec<Float4> =
-            (bvh.order.par_iter()).flat_map_iter(|&s| mesh.corners(s).map(|v| float4(&scale.scaled(&v)))).collect();
+            (wide.order.par_iter()).flat_map_iter(|&s| mesh.corners(s).map(|v| float4(&scale.scaled(&v)))).collect();
         let part = |device: &Arc<Device>| {
-            let kernels = device.build(D, bvh.depth())?;
+            let fits = device.info.largest as usize / (D * size_of::<Float4>());
+            let most = tuning.piece.unwrap_or(if device.info.largest == 0 { usize::MAX } else { fits.max(1) });
+            let is_whole = wide.order.len() <= most;
+            let shape = Shape {
+                dimension: D,
+                depth: wide.depth,
+                piece: (!is_whole).then(|| wide.order.len().div_ceil(PIECES).max(1)),
+                // On a processor neighbours don't go side by side.
+                sorted: tuning.sorted.unwrap_or(device.info.kind == Kind::Gpu),
+            };
+            let kernels = device.build(shape)?;
             let matrices = device.input(&sobol_matrices(), "tables")?;
             let makes_directions = makes_directions::<D>(device, &kernels, &matrices)?;
+            let piece = |corners: &[Float4]| device.input(corners, "the corners of the simplices");
+            let pieces = match shape.piece {
+                None => vec![piece(&corners)?],
+                Some(size) => corners.chunks(D * size).map(piece).collect::<Result<_, _>>()?,
+            };
             let on_device = OnDevice {
                 kernels,
-                nodes: device.input(&nodes, "the nodes of the hierarchy")?,
-                corners: device.input(&corners, "the corners of the simplices")?,
-                simplices: device.input(&bvh.order, "the simplices")?,
+                nodes: device.input(&wide.nodes, "the nodes of the hierarchy")?,
+                corners: pieces,
+                simplices: device.input(&wide.order, "the simplices")?,
                 matrices,
+                is_empty: wide.nodes.is_empty(),
                 rays: RAYS,
             };
             Ok(Part { device: Arc::clone(device), makes_directions, on_device: Mutex::new(on_device) })
         };
         let parts = opencl.devices.iter().map(part).collect::<Result<_, Error>>()?;
-        Ok(Self { parts, tracer, scale, serves, settled: AtomicU64::new(0) })
-    }
-
-    /// Whether the rays of the samplers are made on the devices; else they are made here and handed over.
-    pub fn makes_directions(&self) -> bool {
-        self.parts.iter().all(|part| part.makes_directions)
+        Ok(Self { parts, serves })
     }
 
     /// Does jobs 0 to `count` - 1, each on the device that is free next.
-    pub(super) fn share<R: Send>(
+    pub fn share<R: Send>(
         &self,
         count: usize,
         job: impl Fn(&Part, usize) -> Result<R, TraceError> + Sync,
@@ -151,15 +183,41 @@ impl<const D: usize> OpenClBackend<D> {
         all.sort_by_key(|(i, _)| *i);
         Ok(all.into_iter().map(|(_, found)| found).collect())
     }
+}
+
+impl<const D: usize> OpenClBackend<D> {
+    /// Keeps the mesh for the devices.
+    pub fn new(opencl: &OpenCl, tracer: impl Into<Arc<Tracer<D>>>) -> Self {
+        let tracer = tracer.into();
+        let scale = Scale::of(&tracer.mesh().vertices);
+        let (opencl, scene, settled) = (opencl.clone(), OnceLock::new(), AtomicU64::new(0));
+        Self { opencl, tuning: Tuning::default(), tracer, scale, scene, settled }
+    }
+
+    /// The mesh on the devices; brought there when first asked for.
+    pub(super) fn scene(&self) -> Result<&Scene, Error> {
+        // Not within `get_or_init`: a thread that waits there for its part of the work takes up other work, and would wait
+        // for itself if that asked for the scene.
+        if self.scene.get().is_none() {
+            let _ = self.scene.set(Scene::new(&self.opencl, &self.tracer, &self.scale, self.tuning));
+        }
+        match self.scene.get_or_init(|| Scene::new(&self.opencl, &self.tracer, &self.scale, self.tuning)) {
+            Ok(scene) => Ok(scene),
+            Err(error) => Err(error.clone()),
+        }
+    }
+
+    /// Whether the rays of the samplers are made on the devices; else they are made here and handed over.
+    ///
+    /// # Errors
+    /// [`Error`] if a device has not enough memory or the kernels don't compile.
+    pub fn makes_directions(&self) -> Result<bool, Error> {
+        Ok(self.scene()?.parts.iter().all(|part| part.makes_directions))
+    }
 
     /// How many rays the devices couldn't decide so far, which the host did.
     pub fn settled(&self) -> u64 {
         self.settled.load(Ordering::Relaxed)
-    }
-
-    /// Whether there is nothing to hit.
-    pub(super) fn is_empty(&self) -> bool {
-        self.tracer.bvh().nodes.is_empty()
     }
 
     /// First hits of some rays by one device.
@@ -195,11 +253,8 @@ impl<const D: usize> OpenClBackend<D> {
             let bounds = on.device.input(&bounds, "distances that rays have passed")?;
             let out = on.device.output::<u32>(part.len(), "results")?;
             let state = &*on_device;
-            let arguments = [
-                state.nodes.argument(),
-                state.corners.argument(),
-                state.simplices.argument(),
-                Argument::U32(u32::from(self.is_empty())),
+            let mut arguments = state.mesh();
+            arguments.extend([
                 origins.argument(),
                 directions.argument(),
                 Argument::U32(u32::from(after.is_some())),
@@ -207,7 +262,7 @@ impl<const D: usize> OpenClBackend<D> {
                 bounds.argument(),
                 Argument::U64(part.len() as u64),
                 out.argument(),
-            ];
+            ]);
             on.device.launch(&state.kernels.first_hit, &arguments, part.len())?;
             on.device.read(&out, found)?;
             on_device.learn(part.len(), start.elapsed().as_secs_f64());
@@ -247,6 +302,14 @@ impl<const D: usize> RayBackend<D> for OpenClBackend<D> {
         &self.tracer
     }
 
+    fn prepare(&self) -> Result<(), TraceError> {
+        if self.tracer.mesh().is_translucent() {
+            self.tracer.prepare_wide();
+            return Ok(());
+        }
+        Ok(self.scene().map(|_| ())?)
+    }
+
     fn first_hits(
         &self,
         rays: &[Ray<D>],
@@ -254,17 +317,18 @@ impl<const D: usize> RayBackend<D> for OpenClBackend<D> {
         progress: &dyn Progress,
     ) -> Result<Vec<u32>, TraceError> {
         assert!(after.is_none_or(|after| after.len() == rays.len()), "one bound a ray");
-        if !self.serves {
+        let scene = self.scene()?;
+        if !scene.serves {
             return CpuBackend::new(Arc::clone(&self.tracer)).first_hits(rays, after, progress);
         }
-        let count = self.parts.len();
+        let count = scene.parts.len();
         let size = if count == 1 { rays.len().max(1) } else { rays.len().div_ceil(4 * count).max(1) };
         let jobs: Vec<&[Ray<D>]> = rays.chunks(size).collect();
         let job = |part: &Part, i: usize| {
             let after = after.map(|after| &after[i * size..i * size + jobs[i].len()]);
             self.first_hits_on(part, jobs[i], after, progress)
         };
-        Ok(self.share(jobs.len(), job)?.concat())
+        Ok(scene.share(jobs.len(), job)?.concat())
     }
 
     fn open_fractions(
@@ -281,7 +345,7 @@ impl<const D: usize> RayBackend<D> for OpenClBackend<D> {
     }
 
     fn is_apart(&self) -> bool {
-        self.parts.iter().all(|part| part.device.info.kind != Kind::Cpu)
+        self.opencl.devices().all(|device| device.kind != Kind::Cpu)
     }
 }
 
@@ -326,4 +390,75 @@ fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, matrices
             found.next().is_some_and(|f| (0..D).all(|i| f.0[i].to_bits() == expected[i]))
         })
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vector64;
+    use crate::mesh::{MeshBuilder, Orientation, Surface};
+    use crate::progress::Silent;
+
+    fn pieces_and_orders<const D: usize>(opencl: &OpenCl) {
+        let mut state = 5u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        };
+        let mut surface = Surface::<D> { vertices: Vec::new(), simplices: Vec::new(), normals: None };
+        for s in 0..150 {
+            let centre = Vector64::<D>::from_fn(|_, _| random());
+            surface.vertices.extend((0..D).map(|_| centre + Vector64::from_fn(|_, _| 0.5 * random())));
+            surface.simplices.push(std::array::from_fn(|i| (s * D + i) as u32));
+        }
+        let mut builder = MeshBuilder::new();
+        builder.add("soup", [1.0; 3], &surface, Orientation::Input).unwrap();
+        let tracer = Arc::new(Tracer::new(builder.finish()));
+        let points = ShadingPoint::vertices(tracer.mesh());
+        let rays: Vec<Ray<D>> = (0..2000)
+            .map(|_| Ray::new(Vector::from_fn(|_, _| 2.0 * random() as f32), Vector::from_fn(|_, _| random() as f32)))
+            .collect();
+        let cpu = CpuBackend::new(Arc::clone(&tracer));
+        let ask = |backend: &dyn RayBackend<D>| {
+            // Fewer rays a point than a group has, as many, and more.
+            let open =
+                [5, 64, 300].map(|rays| backend.open_fractions(&points, &Sampling::new(rays, 3), &Silent).unwrap());
+            (open, backend.first_hits(&rays, None, &Silent).unwrap())
+        };
+        let expected = ask(&cpu);
+        for tuning in [
+            Tuning { piece: None, sorted: Some(true) },
+            Tuning { piece: Some(60), sorted: Some(false) },
+            Tuning { piece: Some(149), sorted: Some(true) },
+        ] {
+            let device = OpenClBackend { tuning, ..OpenClBackend::new(opencl, Arc::clone(&tracer)) };
+            assert!(ask(&device) == expected, "{tuning:?}");
+        }
+    }
+
+    #[test]
+    #[ignore = "needs an OpenCL device: run tests/all"]
+    fn neither_pieces_nor_the_order_of_rays_change_a_bit() {
+        let opencl = OpenCl::open(&[]).unwrap();
+        pieces_and_orders::<3>(&opencl);
+        pieces_and_orders::<4>(&opencl);
+    }
+
+    #[test]
+    #[ignore = "needs an OpenCL device: run tests/all"]
+    fn devices_get_the_mesh_when_rays_are_asked_for() {
+        let opencl = OpenCl::open(&[]).unwrap();
+        let surface = Surface::<3> {
+            vertices: (0..3).map(|i| Vector64::from_fn(|k, _| f64::from(u8::from(i == k)))).collect(),
+            simplices: vec![[0, 1, 2]],
+            normals: None,
+        };
+        let mut builder = MeshBuilder::new();
+        builder.add("one", [1.0; 3], &surface, Orientation::Input).unwrap();
+        let device = OpenClBackend::new(&opencl, Tracer::new(builder.finish()));
+        assert!(device.scene.get().is_none());
+        let ray = Ray::new(Vector::zeros(), Vector::from_element(1.0));
+        assert_eq!(device.first_hits(&[ray], None, &Silent), Ok(vec![0]));
+        assert!(device.scene.get().is_some());
+    }
 }

@@ -18,10 +18,7 @@ use opencl3::types::{CL_TRUE, cl_device_id, cl_mem};
 
 use super::devices::Info;
 use super::error::{Error, explain};
-use super::program;
-
-/// Work-items of a group. Always the same, as some compilers make a kernel anew for each number.
-const GROUP: usize = 64;
+use super::program::{self, GROUP, Shape};
 
 /// An open device.
 #[derive(Debug)]
@@ -91,8 +88,16 @@ impl Device {
     }
 
     /// Compiles the kernels, and sees that structs are what they should be.
-    pub fn build(&self, d: usize, depth: usize) -> Result<Kernels, Error> {
-        self.compile(&program::text(d, depth, self.info.double))
+    pub fn build(&self, shape: Shape) -> Result<Kernels, Error> {
+        let kernels = self.compile(&program::text(shape, self.info.double))?;
+        if shape.sorted && self.most_of_group(&kernels.occluded) < GROUP {
+            return self.build(Shape { sorted: false, ..shape });
+        }
+        Ok(kernels)
+    }
+
+    fn most_of_group(&self, kernel: &Kernel) -> usize {
+        kernel.get_work_group_size(self.info.id as cl_device_id).unwrap_or(1).max(1)
     }
 
     fn compile(&self, text: &str) -> Result<Kernels, Error> {
@@ -199,8 +204,7 @@ impl Device {
             };
             set.map_err(self.failed("setting an argument"))?;
         }
-        let most = kernel.get_work_group_size(self.info.id as cl_device_id).unwrap_or(1).max(1);
-        let group = if items == 1 { 1 } else { GROUP.min(most) };
+        let group = if items == 1 { 1 } else { GROUP.min(self.most_of_group(kernel)) };
         let global = items.next_multiple_of(group);
         // SAFETY: the kernels look at nothing beyond the memory they get, for as many items as they are told.
         let started = unsafe {
@@ -224,12 +228,13 @@ mod tests {
     #[ignore = "needs an OpenCL device: run tests/all"]
     fn what_the_compiler_says_is_told() {
         let device = open();
-        let text = program::text(4, 20, device.info.double);
+        let shape = Shape { dimension: 4, depth: 20, piece: None, sorted: false };
+        let text = program::text(shape, device.info.double);
         let broken = device.compile(&text.replace("float4 position;", "flaot4 position;")).unwrap_err().to_string();
         assert!(broken.contains("don't compile") && broken.contains("flaot4"), "{broken}");
         let missing = device.compile(&text.replace("first_hit(", "last_hit(")).unwrap_err().to_string();
         assert!(missing.contains("no kernel `first_hit`"), "{missing}");
-        let other = device.compile(&text.replace("uint padding[2];", "uint padding[6];")).unwrap_err();
+        let other = device.compile(&text.replace("uint next;", "uint next, more[4];")).unwrap_err();
         assert!(matches!(other, Error::Layout { .. }), "{other}");
         assert!(device.compile(&text).is_ok());
     }

@@ -16,15 +16,28 @@ pub(super) const HIT: u8 = 1;
 #[repr(C, align(16))]
 pub(super) struct Float4(pub [f32; 4]);
 
-/// A node of the hierarchy.
+/// Up to eight boxes, one byte for each side of them: those of children that are nodes, then of leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub(super) struct Node {
-    pub low: Float4,
-    pub high: Float4,
-    pub first: u32,
-    pub count: u32,
-    pub padding: [u32; 2],
+    pub origin: Float4,
+    /// Of the axes: a step of a box's sides is 2 to the power of this, less 127.
+    pub exponents: [u8; 4],
+    /// The first child that is a node; the others follow it.
+    pub children: u32,
+    /// The first simplex of the leaves.
+    pub simplices: u32,
+    /// How many children are nodes.
+    pub inner: u32,
+    /// Of a leaf, eight times its first simplex, counted from `simplices`, and how many it has.
+    pub leaves: [u8; 8],
+    /// How many children there are.
+    pub filled: u32,
+    pub padding: u32,
+    /// For each axis and child: in how many steps from the origin its box begins,
+    pub low: [[u8; 8]; 4],
+    /// and ends.
+    pub high: [[u8; 8]; 4],
 }
 
 /// A shading point.
@@ -55,7 +68,8 @@ pub(super) struct StarCone {
 pub(super) fn sizes() -> Vec<u32> {
     [
         size_of::<Node>(),
-        offset_of!(Node, first),
+        offset_of!(Node, leaves),
+        offset_of!(Node, high),
         size_of::<Point>(),
         offset_of!(Point, keys),
         offset_of!(Point, factor),
@@ -71,6 +85,6 @@ pub(super) fn sizes() -> Vec<u32> {
 mod tests {
     #[test]
     fn layouts_are_those_of_opencl() {
-        assert_eq!(super::sizes(), [48, 32, 80, 32, 48, 68, 80, 64]);
+        assert_eq!(super::sizes(), [112, 32, 80, 80, 32, 48, 68, 80, 64]);
     }
 }

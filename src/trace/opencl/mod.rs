@@ -9,6 +9,7 @@
 //! - [`devices()`]: what there is;
 //! - `device`: an open device, the only file that calls OpenCL;
 //! - `layout`, `program`: the structs and the text of the kernels (`kernels/*.cl`);
+//! - `wide`: the hierarchy as devices want it;
 //! - [`OpenClBackend`]: a mesh with its hierarchy on devices;
 //! - `points`: shading points, in batches short enough for watchdogs and for whoever wants to stop.
 //!
@@ -22,6 +23,7 @@ mod layout;
 mod open;
 mod points;
 mod program;
+mod wide;
 
 pub use backend::OpenClBackend;
 pub use devices::{Info, Kind, devices, preferred};

@@ -54,18 +54,20 @@ impl<const D: usize> OpenClBackend<D> {
         sampling: &Sampling,
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>, Error> {
-        let size = POINTS.min(points.len().div_ceil(if self.parts.len() == 1 { 1 } else { 4 * self.parts.len() }));
+        let scene = self.scene()?;
+        let devices = scene.parts.len();
+        let size = POINTS.min(points.len().div_ceil(if devices == 1 { 1 } else { 4 * devices }));
         let jobs: Vec<&[ShadingPoint<D>]> = points.chunks(size.max(1)).collect();
         let job = |on: &Part, i: usize| {
-            let prepared = jobs[i].par_iter().map(|point| self.prepare(point)).collect();
+            let prepared = jobs[i].par_iter().map(|point| self.prepared(point, scene.serves)).collect();
             let given = sampling.sampler == Sampler::Random || !on.makes_directions;
             let chunk = Chunk { points: jobs[i], prepared, sampling, given };
             self.estimate_chunk(on, &chunk, progress)
         };
-        Ok(self.share(jobs.len(), job)?.concat())
+        Ok(scene.share(jobs.len(), job)?.concat())
     }
 
-    fn prepare(&self, point: &ShadingPoint<D>) -> Prepared<D> {
+    fn prepared(&self, point: &ShadingPoint<D>, serves: bool) -> Prepared<D> {
         let mesh = self.tracer.mesh();
         let position = point.position(mesh);
         let ignored = point.ignored(&self.tracer);
@@ -75,7 +77,7 @@ impl<const D: usize> OpenClBackend<D> {
             number: point.number(),
             ignored: ignored.first().copied().unwrap_or(NOTHING),
             // The kernel knows of one.
-            serves: self.serves && ignored.len() <= 1 && is_exact(&self.scale, &position),
+            serves: serves && ignored.len() <= 1 && is_exact(&self.scale, &position),
             star: star_cones(&self.tracer, point).into_iter().filter_map(|(_, cone)| star_cone(cone)).collect(),
         }
     }
@@ -185,11 +187,8 @@ impl<const D: usize> OpenClBackend<D> {
         let given: Vec<Float4> = directions.iter().map(float4).collect();
         let (points, star) = (on.device.input(&points, "points")?, on.device.input(&star, "cones around points")?);
         let (given, out) = (on.device.input(&given, "rays")?, on.device.output::<u8>(total, "results")?);
-        let arguments = [
-            on_device.nodes.argument(),
-            on_device.corners.argument(),
-            on_device.simplices.argument(),
-            Argument::U32(u32::from(self.is_empty())),
+        let mut arguments = on_device.mesh();
+        arguments.extend([
             points.argument(),
             star.argument(),
             on_device.matrices.argument(),
@@ -199,7 +198,7 @@ impl<const D: usize> OpenClBackend<D> {
             Argument::U64(total as u64),
             Argument::F32((f64::from(chunk.sampling.max_distance) * self.scale.factor) as f32),
             out.argument(),
-        ];
+        ]);
         on.device.launch(&on_device.kernels.occluded, &arguments, total)?;
         let mut found = vec![layout::OPEN; total];
         on.device.read(&out, &mut found)?;

@@ -8,17 +8,43 @@ const SAMPLING: &str = include_str!("../../../kernels/sampling.cl");
 const CONE: &str = include_str!("../../../kernels/cone.cl");
 const TRACE: &str = include_str!("../../../kernels/trace.cl");
 
+/// The most pieces of memory for corners: a device takes at least a quarter of all it has in one piece.
+pub(super) const PIECES: usize = 4;
+
 /// The kernels of the program.
 #[cfg(test)]
 const KERNELS: [&str; 4] = ["layout", "directions", "occluded", "first_hit"];
 
-/// The text for dimension `d`, with room for hierarchies of so many levels. In one piece, as some wrappers and drivers
-/// can't take more, and without comments, which some compilers don't take either.
-pub(super) fn text(d: usize, depth: usize, double: bool) -> String {
+/// Work-items of a group. Always the same, as some compilers make a kernel anew for each number.
+pub(super) const GROUP: usize = 64;
+
+/// What the kernels are made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Shape {
+    /// 3 or 4.
+    pub dimension: usize,
+    /// Nodes on the longest way through the hierarchy.
+    pub depth: usize,
+    /// The most simplices whose corners are in one piece of memory, if there are several pieces.
+    pub piece: Option<usize>,
+    /// Whether the rays of a group are brought into an order of directions.
+    pub sorted: bool,
+}
+
+/// The text for this. In one piece, as some wrappers and drivers can't take more, and without comments, which some compilers
+/// don't take either.
+pub(super) fn text(shape: Shape, double: bool) -> String {
+    // By steps, so that what was compiled for one mesh serves most others.
+    let (depth, pieces) = (shape.depth.max(1).next_multiple_of(4), if shape.piece.is_some() { PIECES } else { 1 });
     let mut text = format!(
-        "#define D {d}\n#define STACK {}\n#define LOWEST_SQUARED_COSINE {LOWEST_SQUARED_COSINE:e}f\n",
-        depth.max(1)
+        "#define D {}\n#define DEPTH {depth}\n#define PIECES {pieces}\n#define PIECE {}u\n#define GROUP {GROUP}\n\
+         #define LOWEST_SQUARED_COSINE {LOWEST_SQUARED_COSINE:e}f\n",
+        shape.dimension,
+        shape.piece.unwrap_or(usize::MAX).min(u32::MAX as usize),
     );
+    if shape.sorted {
+        text += "#define SORTED\n";
+    }
     if double {
         text += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n#define DOUBLE\n";
     }
@@ -62,8 +88,10 @@ mod tests {
 
     #[test]
     fn texts_are_plain() {
-        for (d, double) in [(3, false), (3, true), (4, false), (4, true)] {
-            let text = text(d, 20, double);
+        for n in 0..16 {
+            let (dimension, double) = (3 + n % 2, n & 2 > 0);
+            let shape = Shape { dimension, depth: 20, piece: (n & 4 > 0).then_some(1000), sorted: n & 8 > 0 };
+            let text = text(shape, double);
             assert!(text.is_ascii() && !text.contains("/*") && !text.contains("//") && !text.contains("??/"));
             assert!(!text.contains("\\\n"));
             for kernel in KERNELS {

@@ -200,7 +200,7 @@ fn an_endless_fold<const D: usize>() {
     let simplex = (0..mesh.simplices.len() as u32).find(|&s| mesh.object_of(s) == 0).unwrap();
     let point = ShadingPoint::Inside { position, normal, simplex, number: 5 };
     let rays = Estimator::Sampled(Sampling::new(1 << 12, 2));
-    let lit = rays.directional(&**session.backend().unwrap(), &[point], Some(&sent), &Silent).unwrap();
+    let lit = rays.directional(&**session.backend(), &[point], Some(&sent), &Silent).unwrap();
     let (bounced, open) = (lit.bounced.unwrap(), f64::from(lit.estimates.values[0]));
     let reflectance = to_linear(0.5);
     println!("{D}D fold: A {open}, bounce {:?} +- {}", bounced.light[0], bounced.errors[0]);
@@ -311,7 +311,7 @@ fn pictures_under_a_sky<const D: usize>() {
     ] {
         let is_denoised = matches!(name, "auto" | "voxel, denoised");
         let renderer = |lit: bool| {
-            let mut renderer = session.renderer(camera.clone(), dimensions, shading.clone()).unwrap();
+            let mut renderer = session.renderer(camera.clone(), dimensions, shading.clone());
             let mut skylight = Skylight::new(gradient);
             if !matches!(shading, Shading::None) {
                 skylight.radiosity = Some(Arc::clone(&sent));

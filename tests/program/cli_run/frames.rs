@@ -38,6 +38,32 @@ fn details(folder: &Folder, arguments: &[&str]) -> Vec<(String, String)> {
     report["stages"].as_array().unwrap().iter().map(|s| (text(&s["stage"]), text(&s["detail"]))).collect()
 }
 
+#[test]
+fn a_stage_tells_its_numbers_and_its_own_time() {
+    let folder = Folder::with(
+        "name: p\nstages:\n  - scene: {objects: [{tesseract: {size: 1, subdivisions: 4}}]}\n  - occlusion: {samples: 64}\n  - render: \
+         {dimensions: [8, 8, 8], camera: {eye: [0, 0, 0, 2]}}\n  - write: {vti: a.vti}\n",
+    );
+    let output = folder.run(&["--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let [scene, occlusion, render, write] = &report["stages"].as_array().unwrap()[..] else { panic!("{report}") };
+    let vertices = scene["numbers"]["vertices"].as_u64().unwrap();
+    let detail = scene["detail"].as_str().unwrap().replace(',', "");
+    assert_eq!(detail, format!("{vertices} vertices {} simplices", scene["numbers"]["simplices"]));
+    // The render had these values computed; their time is told here all the same.
+    let rays = occlusion["numbers"]["rays"].as_u64().unwrap();
+    assert!(rays > 0 && rays % 64 == 0 && rays <= 64 * vertices, "of the vertices that are seen: {occlusion}");
+    assert!(occlusion["numbers"]["error"].as_f64().unwrap() > 0.0);
+    let seconds = |stage: &Value| stage["seconds"].as_f64().unwrap();
+    let speed = occlusion["numbers"]["rays_per_second"].as_f64().unwrap();
+    assert!((seconds(occlusion) * speed / rays as f64 - 1.0).abs() < 0.01, "{occlusion}");
+    assert!(seconds(scene) + seconds(occlusion) + seconds(render) <= report["seconds"].as_f64().unwrap());
+    assert_eq!((&render["numbers"]["voxels"], &write["numbers"]), (&512.into(), &serde_json::json!({})));
+    let seen = render["numbers"]["seen"].as_u64().unwrap();
+    assert!(render["detail"].as_str().unwrap().starts_with(&format!("{seen} of 512 voxels")) && seen > 0, "{render}");
+    assert!(render["numbers"]["off"]["rms"].is_f64(), "{render}");
+}
+
 /// The number before the word `rays` in the detail of a stage.
 fn rays(details: &[(String, String)], stage: &str) -> u64 {
     let detail = &details.iter().find(|(name, _)| name == stage).unwrap().1;
@@ -208,6 +234,36 @@ fn what_cannot_be_animated_is_refused() {
     ] {
         folder.fails(&["--set", set], 2, &[words]);
     }
+    // Sequences of slices are played with others like them, not with films.
+    let slices = "  - slice: {id: one, range: [-1, 0], count: 3, vtp: one.vtp}
+  - slice: {id: two, range: [-1, 0], count: 4, vtp: two.vtp}
+  - animate: {id: turn, frames: 3, turn: {plane: xw, to: 40}, vti: turn.vti}
+  - paraview: {id: f, input: [one, two], slices: together, state: f.py, screenshot: f.png}
+";
+    let figures = film(slices);
+    for (input, words) in [
+        ("[one, two]", "they need the same `range` and `count`: `two` has others than the one before it"),
+        ("[turn, one]", "`one` can't be played here: an animation has a time in seconds, and slices have their places"),
+        ("[one, turn]", "`turn` can't be played here"),
+    ] {
+        let set = format!("f.input={input}");
+        figures.fails(&["--set", &set, "--set", "f.slices=play"], 2, &[words]);
+    }
+    let together = figures.run(&["--set", "f.input=[turn, one, two]"]);
+    assert_eq!(together.status.code(), Some(0), "{}", String::from_utf8_lossy(&together.stderr));
+    let played = figures.run(&["--set", "f.input=two", "--set", "f.slices=play"]);
+    assert_eq!(played.status.code(), Some(0), "{}", String::from_utf8_lossy(&played.stderr));
+    let state = std::fs::read_to_string(figures.path("out/film/f.py")).unwrap();
+    let panel = "{'kind': 'slices', 'file': 'two.pvd', 'files': ['two.pvd'], 'caption': ''}";
+    let times = "TIMES = [-1.0, -0.6666666666666667, -0.33333333333333337, 0.0]";
+    assert!(state.contains(panel) && state.contains(times) && state.contains("FRAMES = 4"), "{state:.3000}");
+    let unused = figures.run(&["--set", "f.input=turn", "--set", "f.slices=play"]);
+    let told = String::from_utf8_lossy(&unused.stderr).into_owned();
+    assert!(told.contains("slices: has no use where no sequence of slices is shown"), "{told}");
+    // Two bodies, which the file doesn't tell apart.
+    let blurred = figures.run(&["--set", "f.input=turn", "--set", "turn.arrays=[rgba, opacity]"]);
+    let told = String::from_utf8_lossy(&blurred.stderr).into_owned();
+    assert!(told.contains("paraview: shows `turn`, whose arrays lack `object`: its bodies share one skin"), "{told}");
     // 14 bytes a voxel, as the figure wants objects told apart, in each of 10,000 frames: told before anything is computed.
     let told = format!("out/film: {} bytes are to be written, and the disk has ", 14u64 * 10_000 * 1000 * 1000 * 1000);
     folder.fails(&["--set", "turn.frames=10000", "--set", "image.dimensions=[1000, 1000, 1000]"], 3, &[&told]);

@@ -21,11 +21,13 @@ stages:
       camera: {eye: [0.1, 0.2, 0.3, 1], target: [0, 0, 0, -1], field_of_view: 50}
       lights: [{position: [1, 2, 0, 1]}, {direction: [0, -1, 0.5, -1], intensity: 0.5}]
   - write: {vti: image.vti, png: image.png}
+  - wireframe: {id: edges, angle: 20, vtp: edges.vtp}
   - render: {id: plain, occlusion: none, dimensions: [5, 4, 3]}
   - write: {vti: plain.vti}
   - animate: {id: turn, input: image, frames: 2, turn: {plane: xw, to: 30}, scan: [0, -0.5], vti: turn.vti}
   - paraview: {input: [image], state: figure.py}
   - paraview: {input: turn, state: film.py}
+  - paraview: {input: [image, edges], edges: {over: edges, color_by: w}, state: edges.py}
 ";
 
 const THREE: &str = "name: three
@@ -47,6 +49,7 @@ stages:
       camera: {eye: [0.1, 0.2, 1.3], target: [0, 0, -1], field_of_view: 50}
       lights: [{position: [1, 2, 1]}, {direction: [0, -1, -0.5], intensity: 0.5}]
   - write: {vti: image.vti, png: image.png}
+  - wireframe: {id: edges, angle: 20, vtp: edges.vtp}
   - render: {id: plain, occlusion: none, dimensions: [20, 16]}
   - write: {vti: plain.vti}
   - animate: {id: turn, input: image, frames: 2, turn: {plane: xz, to: 30}, scan: [0, -0.5], vti: turn.vti}
@@ -57,7 +60,7 @@ fn a_twin_is_what_one_would_write_by_hand() {
     let folder = Folder::with(FOUR);
     let (made, _, told) = folder.runs(&[]);
     assert_eq!(told, "");
-    assert_eq!(made.iter().filter(|name| name.contains("-3d")).count(), 7, "{made:?}");
+    assert_eq!(made.iter().filter(|name| name.contains("-3d")).count(), 8, "{made:?}");
     let hand = Folder::with(THREE);
     hand.runs(&[]);
     for name in names(&hand.path("out/three")) {
@@ -81,6 +84,17 @@ fn a_twin_is_what_one_would_write_by_hand() {
         let text = state(name);
         assert!(panel(&text, files[0], "in 3D") < panel(&text, files[1], "in 4D"));
     }
+    // Edges are drawn over each image and beside it.
+    let text = state("edges.py");
+    let found: Vec<usize> = [
+        "image-3d.vti', 'caption': 'image 3d', 'edges': 'edges-3d.vtp'",
+        "image.vti', 'caption': 'image', 'edges': 'edges.vtp'",
+    ]
+    .into_iter()
+    .chain(["'edges', 'file': 'edges-3d.vtp'", "'edges', 'file': 'edges.vtp'"])
+    .map(|panel| text.find(panel).unwrap_or_else(|| panic!("{panel}: {text:.3000}")))
+    .collect();
+    assert!(found.is_sorted(), "{found:?}");
     // A second run has nothing to do, and one without the twin leaves the 4D files as they are.
     assert_eq!(folder.runs(&[]).0, Vec::<String>::new());
     let (made, cached, _) = folder.runs(&["--set", "scene.twin=false"]);
