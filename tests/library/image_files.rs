@@ -238,7 +238,7 @@ fn nrrd_data_where_it_is() {
         std::fs::write(at.join(format!("{name}.nhdr")), header).unwrap();
     }
     good("exact.nhdr");
-    is_refused(at, json!({"file": "more.nhdr"}), &["more.nhdr", "a data file holds more values than"]);
+    is_refused(at, json!({"file": "more.nhdr"}), &["a data file holds more values than"]);
     for (i, frame) in content.chunks(2016).enumerate() {
         std::fs::write(at.join(format!("t{:02}.bin", i + 1)), frame).unwrap();
     }
