@@ -121,6 +121,11 @@ fn what_is_not_needed_is_not_parsed() {
         folder.is_cube("normals.stl", ascii_stl(b"part", normal, ""));
     }
     folder.is_cube("umlaut.stl", ascii_stl(b"Geh\xe4use", "0 0 0", ""));
+    for name in [&b"a facet vertex 1"[..], b"solid endsolid endfacet", b"vertex 1 2"] {
+        folder.is_cube("name.stl", ascii_stl(name, "0 0 0", ""));
+    }
+    let line = String::from_utf8(ascii_stl(b"", "0 0 0", "")).unwrap().replace('\n', " ");
+    folder.is_cube("line.stl", line.into_bytes());
     for behind in ["; exported by a program\n", "facets: 12\n", "\n\nEOF", "solid \nendsolid\n"] {
         folder.is_cube("behind.stl", ascii_stl(b"", "0 0 1", behind));
     }

@@ -732,6 +732,9 @@ fn damaged_files_are_refused_by_name() {
         "the name must end in .stl, .obj, .ply, .msh, .vtk, .vtp, .vtu, .pvtp, .pvtu, .pvd or",
     );
     refused("cut.stl", &binary_stl("x")[..100], "it declares 4 triangles, which take 284 bytes, and has 100");
+    let mut uncounted = binary_stl("x");
+    uncounted[80..84].fill(0);
+    refused("uncounted.stl", &uncounted, "declares no triangles, and has room for 4");
     refused("none.stl", ascii_stl("", &[]).as_bytes(), "holds no triangle");
     refused("word.stl", ascii_stl("", &CORNER).replace("vertex 1", "vertex one").as_bytes(), "triangle 0");
     refused("nan.stl", ascii_stl("", &CORNER).replace("vertex 1", "vertex nan").as_bytes(), "finite");

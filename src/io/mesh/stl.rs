@@ -23,7 +23,12 @@ pub fn read(bytes: &[u8]) -> Result<UnstructuredGrid, String> {
     if needed != Some(bytes.len()) && is_text(bytes) {
         return ascii(bytes);
     }
+    let behind = bytes.len().saturating_sub(HEADER);
     match (needed, declared) {
+        (_, Some(0)) if behind > 0 && behind.is_multiple_of(RECORD) => Err(format!(
+            "declares no triangles, and has room for {}: whoever wrote it didn't finish; write it again",
+            behind / RECORD
+        )),
         (Some(needed), _) if needed <= bytes.len() => Ok(binary(&bytes[HEADER..needed])),
         (Some(needed), Some(declared)) => Err(format!(
             "is cut off, or no STL file: it declares {declared} triangles, which take {needed} bytes, and has {}",
@@ -39,6 +44,15 @@ fn is_text(bytes: &[u8]) -> bool {
     // What is left of an ascii file cut off in its first line is still one.
     let known = |word: &[u8]| word.eq_ignore_ascii_case(b"facet") || word.eq_ignore_ascii_case(b"endsolid");
     begins && text && (bytes.len() < HEADER || words(bytes).any(known))
+}
+
+/// Takes the first word off a text.
+fn next_word<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let text = rest.trim_ascii_start();
+    let end = text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
+    let (word, behind) = text.split_at(end);
+    *rest = behind;
+    (!word.is_empty()).then_some(word)
 }
 
 fn words(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
@@ -61,16 +75,22 @@ fn ascii(bytes: &[u8]) -> Result<UnstructuredGrid, String> {
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     let (mut facets, mut corners) = (0, Vec::<u32>::new());
     let (mut within, mut ended) = (false, false);
-    let mut words = words(bytes);
-    while let Some(word) = words.next() {
+    let mut rest = bytes;
+    while let Some(word) = next_word(&mut rest) {
         let is = |name: &[u8]| word.eq_ignore_ascii_case(name);
+        if (is(b"solid") || is(b"endsolid"))
+            && let Some(end) = rest.iter().position(|byte| matches!(byte, b'\n' | b'\r'))
+        {
+            // The rest of the line is a name, whatever its words are.
+            rest = &rest[end..];
+        }
         if is(b"facet") || is(b"endsolid") {
             (within, ended) = (is(b"facet"), is(b"endsolid"));
             corners.clear();
         } else if within && is(b"vertex") {
             let mut point = [0.0; 3];
             for x in &mut point {
-                let word = words.next().ok_or("is cut off: the last vertex is not whole")?;
+                let word = next_word(&mut rest).ok_or("is cut off: the last vertex is not whole")?;
                 let number = std::str::from_utf8(word).ok().and_then(|text| text.parse::<f32>().ok());
                 let shown: String = String::from_utf8_lossy(word).chars().take(40).collect();
                 *x = f64::from(
