@@ -22,7 +22,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
-use super::fill::{Unfilled, fill};
+use super::fill::{Faces, Unfilled, fill};
 use super::lattice::compact;
 use super::numbers::{check_count, finite, only_in, point};
 use super::product::Chain;
@@ -100,7 +100,7 @@ impl ExtrudeSpec {
                 let interval = Chain::interval(self.layers);
                 if self.caps == Some(true) {
                     let ((points, tetrahedra), overlap) =
-                        fill(&points, &triangles, progress).map_err(|unfilled| match unfilled {
+                        fill(&points, &triangles, Faces::Anew, progress).map_err(|unfilled| match unfilled {
                             Unfilled::Cancelled => Error::Cancelled,
                             Unfilled::Refused(message) => input.wrong(message).into(),
                         })?;

@@ -653,9 +653,10 @@ fn what_meets_nothing_is_told() {
         let notes = run_stages(folder.path(), &stages).unwrap();
         let dark = "reaches nothing that is seen: its intensity or its color is 0";
         for told in [
-            "lights[0] reaches nothing that is seen: it is inside a body or behind one".to_owned(),
-            format!("lights[1] {dark}"),
-            format!("lights[2] {dark}"),
+            "render r: lights[0] reaches nothing that is seen: it is inside a body or behind one".to_owned(),
+            "animate film: in some frames lights[0] reaches nothing that is seen: it is inside a body".to_owned(),
+            format!("render r: lights[1] {dark}"),
+            format!("render r: lights[2] {dark}"),
             "edges: there are no such edges".to_owned(),
             "past: no hyperplane meets anything; all files are empty".to_owned(),
         ] {

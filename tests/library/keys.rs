@@ -184,6 +184,7 @@ const CHANGES: &[(&str, Result<&str, &str>)] = &[
     ("ParaviewSpec.id", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.input", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.edges", Err("a state is held against the file that is there, whole")),
+    ("ParaviewSpec.slices", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.state", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.screenshot", Err("a state is held against the file that is there, whole")),
     ("ParaviewSpec.reader", Err("a state is held against the file that is there, whole")),

@@ -236,7 +236,8 @@ fn extruded_triangles_are_walls() {
     // Its legs are bodies of their own that reach into its trunk: each is filled.
     let filled = build::<4>(json!({"extrude": {"mesh": "ant.ply", "from": 0, "to": 2, "caps": true}}));
     assert_closed_manifold(&filled);
-    close(volume(&filled), 2.0 * volume(&ant));
+    // Flat faces are divided anew, and rounding has moved their corners out of the plane.
+    assert!((volume(&filled) / (2.0 * volume(&ant)) - 1.0).abs() < 1e-8);
 }
 
 #[test]

@@ -33,7 +33,10 @@ fn every_pipeline_leaves_what_it_promises() {
         let overrides = smaller::smaller(&path);
         let pipeline = Pipeline::load(&path, &overrides, Some(folder.path().to_owned())).unwrap();
         let report = run(&pipeline, &Settings::default(), &Silent).unwrap();
-        assert_eq!(report.notes, Vec::<String>::new(), "{}", path.display());
+        // The legs of the ant are bodies of their own that reach into its trunk.
+        let known =
+            |note: &String| path.ends_with("lessons/08_ant.yaml") && note.contains("ant.ply: passes through itself");
+        assert!(report.notes.iter().all(known), "{}: {:?}", path.display(), report.notes);
         println!("{}: {:.2} s", path.display(), report.seconds);
         for (_, write) in pipeline.plan.all::<WritePlan>() {
             let render = &pipeline.plan[write.render];

@@ -65,8 +65,17 @@ impl From<String> for Unfilled {
     }
 }
 
+/// What becomes of the triangles of flat faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Faces {
+    /// They may be others over the same corners.
+    Anew,
+    /// They stay, since something else is joined to them.
+    Kept,
+}
+
 /// The points and the positively oriented tetrahedra of the solid within these triangles. Points with identical coordinates
-/// must be one point. Triangles that face the wrong way are turned. Beside them a complaint, if the surface passes through itself and is filled all the
+/// must be one point. Triangles that face the wrong way are turned, and flat faces divided anew unless they are `kept`. Beside them a complaint, if the surface passes through itself and is filled all the
 /// same.
 ///
 /// # Errors
@@ -74,6 +83,7 @@ impl From<String> for Unfilled {
 pub fn fill(
     points: &[Vector64<3>],
     triangles: &[[u32; 3]],
+    faces: Faces,
     progress: &dyn Progress,
 ) -> Result<(Solid, Option<String>), Unfilled> {
     let nothing = || "encloses nothing: all its triangles are flat or cancel".to_owned();
@@ -83,7 +93,11 @@ pub fn fill(
     }
     let frame = Frame::of(points, &triangles);
     let near: Vec<Vector64<3>> = points.iter().map(|point| frame.inwards(point)).collect();
-    let triangles = flat::compact(&near, slivers::turned(&near, outward(&near, triangles)?));
+    let triangles = slivers::turned(&near, outward(&near, triangles)?);
+    let triangles = match faces {
+        Faces::Anew => flat::compact(&near, triangles),
+        Faces::Kept => triangles,
+    };
     if enclosed_volume(corners(&near, &triangles)) < LEAST * LEAST {
         return Err(nothing().into());
     }

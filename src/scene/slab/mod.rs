@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Error;
-use super::fill::{self, Unfilled};
+use super::fill::{self, Faces, Unfilled};
 use super::numbers::{finite, point};
 use crate::geometry::{Dimension, Vector64, determinant, normal_of};
 use crate::mesh::Surface;
@@ -262,7 +262,7 @@ fn solid_cap<const D: usize>(
     let points: Vec<Vector64<3>> = used.iter().map(|&v| plane.coordinates(&vertices[v as usize]).into()).collect();
     let bits = |p: &Vector64<3>| -> [u64; 3] { std::array::from_fn(|i| p[i].to_bits()) };
     let mut numbers: HashMap<[u64; 3], u32> = points.iter().map(bits).zip(used).collect();
-    let ((found, tetrahedra), _) = fill::fill(&points, &triangles, progress)?;
+    let ((found, tetrahedra), _) = fill::fill(&points, &triangles, Faces::Kept, progress)?;
     for point in &found {
         numbers.entry(bits(point)).or_insert_with(|| {
             vertices.push(foot + plane.point((*point).into()));

@@ -214,7 +214,7 @@ impl Stage for SlicePlan {
             let mut notes = Vec::new();
             met |= !found.faces.is_empty();
             // Of a sequence some may go past; where all do, the last one tells.
-            let all = !met && stale.len() == files.len() && i + 1 == files.len();
+            let all = list.is_some() && !met && stale.len() == files.len() && i + 1 == files.len();
             if found.faces.is_empty() && (list.is_none() || all) {
                 let what = match cut {
                     LevelPlan::Across(_) | LevelPlan::W if all => "no hyperplane meets anything; all files are empty",
