@@ -120,6 +120,9 @@ impl<const D: usize> Lighting<D> {
         let specular = lit.gloss.specular.unwrap_or(self.specular);
         let shininess = lit.gloss.shininess.unwrap_or(self.shininess);
         for (light, reached) in self.lights.iter().zip(&self.reached) {
+            if light.strength == [0.0; 3] {
+                continue;
+            }
             let point = narrow(&lit.point);
             let Some((towards, distance)) = light.source.from(&widen(&point)) else { continue };
             let cosine = lit.normal.dot(&towards);
