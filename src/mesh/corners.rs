@@ -64,6 +64,9 @@ struct Use<const D: usize> {
     corners: Vec<(u32, usize)>,
 }
 
+/// Points whose corners are grouped before any is numbered.
+const TOGETHER: usize = 1 << 14;
+
 /// Splits the vertices of one object, whose simplices are oriented already: where neighbours' normals differ by more than this
 /// angle, or, without one, between the sides of sheets only.
 pub(super) fn split<const D: usize>(
@@ -80,23 +83,25 @@ pub(super) fn split<const D: usize>(
     let stars: Vec<&[Corner]> = corners.chunk_by(|a, b| a.identity == b.identity).collect();
     // Coordinates are single precision: angles that are equal but for their rounding are equal.
     let cosine = degrees.map(|degrees| libm::cos(degrees.to_radians()) - 1e-6);
-    let uses: Vec<Vec<Use<D>>> = (stars.par_iter())
-        .map(|star| groups(mesh, star, cosine, &|s| normals[s as usize - first], &flat, sides))
-        .collect();
+    let groups = |star: &&[Corner]| groups(mesh, star, cosine, &|s| normals[s as usize - first], &flat, sides);
 
     let mut found = Corners { sources: Vec::new(), normals: vec![Vector::zeros(); vertices.len()], moved: Vec::new() };
     let mut taken = vec![false; vertices.len()];
     let mut added = Vec::new();
-    for used in uses.into_iter().flatten() {
-        let own = used.vertex as usize - vertices.start;
-        if !std::mem::replace(&mut taken[own], true) {
-            found.normals[own] = used.normal;
-            continue;
+    // Some at a time: the corners of all groups together take more memory than the mesh.
+    for stars in stars.chunks(TOGETHER) {
+        let uses: Vec<Vec<Use<D>>> = stars.par_iter().map(groups).collect();
+        for used in uses.into_iter().flatten() {
+            let own = used.vertex as usize - vertices.start;
+            if !std::mem::replace(&mut taken[own], true) {
+                found.normals[own] = used.normal;
+                continue;
+            }
+            let number = found.sources.len() as u32;
+            found.sources.push(used.vertex);
+            added.push(used.normal);
+            found.moved.extend(used.corners.into_iter().map(|(simplex, place)| (simplex, place, number)));
         }
-        let number = found.sources.len() as u32;
-        found.sources.push(used.vertex);
-        added.push(used.normal);
-        found.moved.extend(used.corners.into_iter().map(|(simplex, place)| (simplex, place, number)));
     }
     found.normals.extend(added);
     found
