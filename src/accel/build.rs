@@ -118,12 +118,14 @@ impl<const D: usize> Part<D> {
         match self {
             Self::Piece(piece) => {
                 let by = nodes.len() as u32 - 1;
-                let moved = |node: &Node<D>| match node.count {
-                    0 => Node { first: node.first + by, ..*node },
-                    _ => *node,
-                };
-                nodes[place] = moved(&piece[0]);
-                nodes.extend(piece[1..].iter().map(moved));
+                let mut moved = piece.into_iter().map(|node| match node.count {
+                    0 => Node { first: node.first + by, ..node },
+                    _ => node,
+                });
+                if let Some(root) = moved.next() {
+                    nodes[place] = root;
+                }
+                nodes.extend(moved);
             }
             Self::Above(bounds, parts) => {
                 let first = nodes.len();
