@@ -79,7 +79,9 @@ __global const float4 *corners_of(
     return corners + D * (size_t)place;
 }
 #endif
-#define MESH __global const Node *nodes, __global const float4 *corners_0, __global const float4 *corners_1, __global const float4 *corners_2, __global const float4 *corners_3, __global const uint *simplices
+#define MESH \
+    __global const Node *nodes, __global const float4 *corners_0, __global const float4 *corners_1, \
+    __global const float4 *corners_2, __global const float4 *corners_3, __global const uint *simplices
 
 /* As geometry::Ray: components that would overflow the reciprocal are zero. */
 float4 cleaned(float4 direction) {
@@ -139,7 +141,8 @@ size_t sorted(float4 direction, __local ushort *keys) {
 
 /* Whether anything blocks each ray of each point: for every ray HIT, OPEN or UNSURE, which the host settles. Rays come from
    `given`, or where that is not used from the points' sequences. */
-#define DIRECTION(i) cleaned(use_given ? given[i] : sampled(points[(i) / rays], points[(i) / rays].next + (uint)((i) % rays), matrices))
+#define DIRECTION(i) \
+    cleaned(use_given ? given[i] : sampled(points[(i) / rays], points[(i) / rays].next + (uint)((i) % rays), matrices))
 
 __kernel void occluded(
     MESH, uint empty, __global const Point *points, __global const StarCone *star, __global const uint *matrices,

@@ -78,65 +78,13 @@ fn grow<const D: usize>(all: &mut Aabb<D>, other: &Aabb<D>) {
     }
 }
 
-/// A part of the tree: a piece that one thread built, or a node above two parts.
-enum Part<const D: usize> {
-    /// The root first. Children are named by their place in the piece.
-    Piece(Vec<Node<D>>),
-    /// The box and what is in it.
-    Above(Aabb<D>, Box<[Self; 2]>),
-}
-
 /// Orders the items by leaf, and returns the nodes over them, the root first; on all threads if `parallel`.
 pub(super) fn tree<const D: usize>(items: &mut [Item<D>], parallel: bool) -> Vec<Node<D>> {
     if items.is_empty() {
         return Vec::new();
     }
     let bounds = around(items);
-    match subtree(items, bounds, 0, 0, if parallel { PARALLEL } else { usize::MAX }) {
-        Part::Piece(nodes) => nodes,
-        // Joined once and not level by level, which would copy each node, and ask for its memory, as many times.
-        above => {
-            let mut nodes = Vec::with_capacity(above.count());
-            nodes.push(Node { bounds, first: 0, count: 0 });
-            above.append(&mut nodes, 0);
-            nodes
-        }
-    }
-}
-
-impl<const D: usize> Part<D> {
-    fn count(&self) -> usize {
-        match self {
-            Self::Piece(nodes) => nodes.len(),
-            Self::Above(_, parts) => 1 + parts.iter().map(Self::count).sum::<usize>(),
-        }
-    }
-
-    /// Writes the root to its `place`, and the rest behind all nodes: its children, then what is below the left one, then
-    /// what is below the right one.
-    fn append(self, nodes: &mut Vec<Node<D>>, place: usize) {
-        match self {
-            Self::Piece(piece) => {
-                let by = nodes.len() as u32 - 1;
-                let mut moved = piece.into_iter().map(|node| match node.count {
-                    0 => Node { first: node.first + by, ..node },
-                    _ => node,
-                });
-                if let Some(root) = moved.next() {
-                    nodes[place] = root;
-                }
-                nodes.extend(moved);
-            }
-            Self::Above(bounds, parts) => {
-                let first = nodes.len();
-                nodes[place] = Node { bounds, first: first as u32, count: 0 };
-                nodes.extend([nodes[place]; 2]);
-                for (k, part) in parts.into_iter().enumerate() {
-                    part.append(nodes, first + k);
-                }
-            }
-        }
-    }
+    subtree(items, bounds, 0, 0, if parallel { PARALLEL } else { usize::MAX })
 }
 
 fn around<const D: usize>(items: &[Item<D>]) -> Aabb<D> {
@@ -145,29 +93,40 @@ fn around<const D: usize>(items: &[Item<D>]) -> Aabb<D> {
     bounds
 }
 
-/// The tree over items that begin at place `first` of all.
+/// The tree over items that begin at place `first` of all. Children are named by their place in the result.
 fn subtree<const D: usize>(
     items: &mut [Item<D>],
     bounds: Aabb<D>,
     first: usize,
     depth: usize,
     parallel: usize,
-) -> Part<D> {
+) -> Vec<Node<D>> {
     let root = Node { bounds, first: first as u32, count: items.len() as u32 };
     if items.len() < parallel {
         let mut nodes = Vec::with_capacity(items.len());
         nodes.push(root);
         split_below(items, depth, &mut nodes, 0);
-        nodes.shrink_to_fit();
-        return Part::Piece(nodes);
+        return nodes;
     }
-    let Some((middle, sides)) = divide(items, &bounds, depth, true) else { return Part::Piece(vec![root]) };
+    let Some((middle, sides)) = divide(items, &bounds, depth, true) else { return vec![root] };
     let (left, right) = items.split_at_mut(middle);
     let (left, right) = rayon::join(
         || subtree(left, sides[0], first, depth + 1, parallel),
         || subtree(right, sides[1], first + middle, depth + 1, parallel),
     );
-    Part::Above(bounds, Box::new([left, right]))
+    // The two roots become neighbours behind this one; the rest of the left tree follows, then that of the right one.
+    let mut nodes = Vec::with_capacity(1 + left.len() + right.len());
+    nodes.push(Node { first: 1, count: 0, ..root });
+    let moved = |node: &Node<D>, by: usize| match node.count {
+        0 => Node { first: node.first + by as u32, ..*node },
+        _ => *node,
+    };
+    let by = [2, left.len() + 1];
+    nodes.push(moved(&left[0], by[0]));
+    nodes.push(moved(&right[0], by[1]));
+    nodes.extend(left[1..].iter().map(|node| moved(node, by[0])));
+    nodes.extend(right[1..].iter().map(|node| moved(node, by[1])));
+    nodes
 }
 
 /// Splits a leaf, which stands at `place` of the nodes, as far as that pays.

@@ -115,21 +115,6 @@ impl<const D: usize> Bvh<D> {
         }
     }
 
-    /// Nodes on the longest way from the root to a leaf.
-    pub fn depth(&self) -> usize {
-        let mut depths = vec![0; self.nodes.len()];
-        let mut deepest = 0;
-        for (i, node) in self.nodes.iter().enumerate() {
-            // Children come after their parents.
-            depths[i] = depths[i].max(1);
-            deepest = deepest.max(depths[i]);
-            if node.count == 0 {
-                (depths[node.first as usize], depths[node.first as usize + 1]) = (depths[i] + 1, depths[i] + 1);
-            }
-        }
-        deepest
-    }
-
     /// Checks that every item is in exactly one leaf, every box within its parent's, and every node reached once.
     pub fn validate(&self, bounds: impl Fn(u32) -> Aabb<D>) -> Result<(), String> {
         let mut seen = vec![false; self.order.len()];

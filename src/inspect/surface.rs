@@ -145,21 +145,11 @@ impl SurfaceSummary {
             degenerate_simplices: (simplices.iter()).filter(|s| is_degenerate(&s.map(|v| rounded[v as usize]))).count(),
             measure: surface_measure(corners(points, simplices)),
             enclosed_volume: pairs.is_closed().then(|| enclosed_volume(corners(points, simplices))),
-            crossing: if closed { crossing(points, &welded) } else { None },
+            crossing: if closed { crossings::told_if_few(points, &welded, MOST_CROSSED) } else { None },
             worst_quality: worst.map(|(_, quality)| quality),
             worst_simplex: worst.map(|(simplex, _)| simplex),
         })
     }
-}
-
-/// Where a closed surface passes through itself, if it is one in 3D and not too large to look.
-fn crossing<const D: usize>(points: &[Vector64<D>], simplices: &[[u32; D]]) -> Option<String> {
-    if D != 3 || simplices.len() > MOST_CROSSED {
-        return None;
-    }
-    let points: Vec<Vector64<3>> = points.iter().map(|p| Vector64::from([p[0], p[1], p[2]])).collect();
-    let triangles: Vec<[u32; 3]> = simplices.iter().map(|s| [s[0], s[1], s[2]]).collect();
-    crossings::told(&points, &triangles)
 }
 
 /// The points' coordinates from the array `position`, if there is one of D components.

@@ -15,6 +15,16 @@ const THROUGH: f64 = 4e-6;
 /// The most triangles looked at to see what is inside what.
 const MOST_LOOKS: usize = 100_000_000;
 
+/// [`told`] of a surface in any dimension; none also if that isn't 3, or there are more than so many triangles.
+pub fn told_if_few<const D: usize>(points: &[Vector64<D>], simplices: &[[u32; D]], most: usize) -> Option<String> {
+    if D != 3 || simplices.len() > most {
+        return None;
+    }
+    let points: Vec<Vector64<3>> = points.iter().map(|p| Vector64::from([p[0], p[1], p[2]])).collect();
+    let triangles: Vec<[u32; 3]> = simplices.iter().map(|s| [s[0], s[1], s[2]]).collect();
+    told(&points, &triangles)
+}
+
 /// Where a closed surface of any size passes through itself, in words; none if it doesn't.
 pub fn told(points: &[Vector64<3>], triangles: &[[u32; 3]]) -> Option<String> {
     let used = || triangles.as_flattened().iter().map(|&i| points[i as usize]);

@@ -73,11 +73,9 @@ fn crossing<const D: usize>(surface: &Surface<D>) -> Option<String> {
     if D != 3 || surface.simplices.len() > MOST_CROSSED {
         return None;
     }
-    let points: Vec<Vector64<3>> = surface.vertices.iter().map(|p| Vector64::from([p[0], p[1], p[2]])).collect();
-    let triangles: Vec<[u32; 3]> = surface.simplices.iter().map(|s| [s[0], s[1], s[2]]).collect();
-    let (points, triangles) = welded(&points, triangles);
-    let closed = facet_pairs(&triangles).is_closed();
-    let crossing = if closed { crossings::told(&points, &triangles) } else { None };
+    let (points, triangles) = welded(&surface.vertices, surface.simplices.clone());
+    let is_closed = facet_pairs(&triangles).is_closed();
+    let crossing = is_closed.then(|| crossings::told_if_few(&points, &triangles, MOST_CROSSED)).flatten();
     crossing.map(|crossing| {
         format!("{crossing}; what is inside another body is dark: unite them in the program that made them if that isn't wanted")
     })

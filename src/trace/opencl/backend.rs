@@ -201,10 +201,7 @@ impl<const D: usize> OpenClBackend<D> {
         if self.scene.get().is_none() {
             let _ = self.scene.set(Scene::new(&self.opencl, &self.tracer, &self.scale, self.tuning));
         }
-        match self.scene.get_or_init(|| Scene::new(&self.opencl, &self.tracer, &self.scale, self.tuning)) {
-            Ok(scene) => Ok(scene),
-            Err(error) => Err(error.clone()),
-        }
+        self.scene.wait().as_ref().map_err(Error::clone)
     }
 
     /// Whether the rays of the samplers are made on the devices; else they are made here and handed over.
@@ -423,7 +420,9 @@ mod tests {
             // Fewer rays a point than a group has, as many, and more.
             let open =
                 [5, 64, 300].map(|rays| backend.open_fractions(&points, &Sampling::new(rays, 3), &Silent).unwrap());
-            (open, backend.first_hits(&rays, None, &Silent).unwrap())
+            // And a single one.
+            let one = backend.open_fractions(&points[..1], &Sampling::new(1, 3), &Silent).unwrap();
+            (open, one, backend.first_hits(&rays, None, &Silent).unwrap())
         };
         let expected = ask(&cpu);
         for tuning in [

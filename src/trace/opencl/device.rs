@@ -204,7 +204,7 @@ impl Device {
             };
             set.map_err(self.failed("setting an argument"))?;
         }
-        let group = if items == 1 { 1 } else { GROUP.min(self.most_of_group(kernel)) };
+        let group = GROUP.min(self.most_of_group(kernel));
         let global = items.next_multiple_of(group);
         // SAFETY: the kernels look at nothing beyond the memory they get, for as many items as they are told.
         let started = unsafe {

@@ -65,7 +65,7 @@ pub(super) fn text(shape: Shape, double: bool) -> String {
     without_comments(&text)
 }
 
-/// Replaces each comment by a space. The kernels have no string with a comment's sign in it.
+/// Replaces each comment by a space, and joins lines that go on. The kernels have no string with a comment's sign in it.
 fn without_comments(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -74,7 +74,7 @@ fn without_comments(text: &str) -> String {
         out.push(' ');
         rest = rest[start..].find("*/").map_or("", |end| &rest[start + end + 2..]);
     }
-    out + rest
+    (out + rest).replace("\\\n", " ")
 }
 
 /// The kernel's sizes are held against these.
@@ -101,6 +101,6 @@ mod tests {
             assert_eq!(opened, text.matches("#endif").count());
             assert_eq!(text.contains("double4"), double);
         }
-        assert_eq!(without_comments("a /* b */ c/**/d"), "a   c d");
+        assert_eq!(without_comments("a /* b */ c/**/d\\\ne"), "a   c d e");
     }
 }
