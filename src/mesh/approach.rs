@@ -32,10 +32,10 @@ pub fn approach<const D: usize>(mesh: &Mesh<D>, around: &[u32], vertex: u32) -> 
         let of_object = || mesh.copies.members_within(first, &object.simplices).find(|&s| has_it(s));
         if has_it(first) { Some(first) } else { of_object() }
     };
-    let owned: Vec<u32> = around.iter().filter_map(own).collect();
-    if owned.len() == around.len() {
+    if around.iter().all(|first| own(first).is_some()) {
         return normal;
     }
+    let owned: Vec<u32> = around.iter().filter_map(own).collect();
     let point = widen(&mesh.vertices[vertex as usize]);
     let corners = |simplex: u32| mesh.corners(simplex).map(|v| widen(&v));
     let inwards: Vec<Vector64<D>> = (owned.iter())

@@ -23,7 +23,9 @@
 //! Of independent rays, none out of N going the other way means, at 95 %, a share below
 //! 3/N (the rule of three), which are two standard errors of 1.5/N: no estimate is below that.
 
-use super::groups::Groups;
+use std::sync::LazyLock;
+
+use super::groups::{Groups, LEAST};
 use super::noise;
 use super::sampling::{Sampler, Target};
 use crate::geometry::{Dimension, Vector};
@@ -32,7 +34,7 @@ use crate::geometry::{Dimension, Vector};
 pub type Watch<'w, const D: usize> = dyn FnMut(Vector<D>, bool) + 'w;
 
 /// How much more even several groups are together, as a share of the exponent that the rate of convergence gives.
-pub(super) const GAIN: f64 = 0.6;
+const GAIN: f64 = 0.6;
 
 /// A value, and how sure it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +85,11 @@ impl Accumulator {
 
     /// The next `count` rays; the lowest bits of `open` tell which of them escape.
     pub fn add(&mut self, mut open: u64, mut count: u32) {
+        if self.rays() == 0 && count == u64::BITS {
+            // What the loop below would come to: a group for each byte.
+            self.groups = Groups::of(u64::BITS / LEAST as u32, open.to_le_bytes().map(u8::count_ones));
+            return;
+        }
         while count > 0 {
             let taken = count.min(self.groups.room()).min(u64::BITS);
             self.groups.add(taken, (open & (u64::MAX >> (u64::BITS - taken))).count_ones());
@@ -107,7 +114,7 @@ impl Accumulator {
         let variance = match self.even_in {
             None => self.variance_of_rays().max(bound(self.rays()).powi(2)),
             Some(dimension) => {
-                let together = libm::pow(rays / f64::from(self.groups.size()), -GAIN / dimension.pick(2.0, 3.0));
+                let together = variance_together(rays / f64::from(self.groups.size()), dimension);
                 let groups = self.variance_of_groups() * together;
                 let value = (f64::from(self.escaped()) + 0.5) / (rays + 1.0);
                 groups.max(0.5 * noise::of_even_rays(dimension, value, rays))
@@ -149,6 +156,17 @@ impl Accumulator {
         let value = f64::from(self.escaped()) / f64::from(self.rays());
         Estimate { value: value as f32, error: self.error() as f32, rays: self.rays() }
     }
+}
+
+/// The variance of the mean of so many groups of even rays, of that of independent ones.
+pub(super) fn variance_together(groups: f64, dimension: Dimension) -> f64 {
+    /// Of as many groups as 2^n rays make.
+    static OF_LEAST: LazyLock<[f64; 2]> =
+        LazyLock::new(|| [Dimension::Three, Dimension::Four].map(|d| of(LEAST as f64, d)));
+    fn of(groups: f64, dimension: Dimension) -> f64 {
+        libm::pow(groups, -GAIN / dimension.pick(2.0, 3.0))
+    }
+    if groups == LEAST as f64 { dimension.pick(OF_LEAST[0], OF_LEAST[1]) } else { of(groups, dimension) }
 }
 
 /// What no estimate of so many independent rays is below: the rule of three.
@@ -215,7 +233,7 @@ mod tests {
             words.add(word.iter().rev().fold(0, |w, &r| w << 1 | u64::from(r)), 64);
             let single = accumulator(&rays[..64 * (n + 1)]);
             assert_eq!(words.estimate(), single.estimate());
-            assert_eq!(words.groups, single.groups);
+            assert_eq!((words.groups.finished(), words.rays()), (single.groups.finished(), single.rays()));
         }
     }
 

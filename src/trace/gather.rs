@@ -20,7 +20,7 @@
 use rayon::prelude::*;
 
 use super::cpu::PacketTracer;
-use super::estimate::{Estimate, GAIN};
+use super::estimate::{Estimate, variance_together};
 use super::surroundings::{Met, Surroundings};
 use super::{Sampler, Sampling, ShadingPoint};
 use crate::accel::Tracer;
@@ -103,7 +103,7 @@ impl Light {
             let scatter: f64 = self.groups[..full].iter().map(|g| (g[c] - sum / count).powi(2)).sum();
             scatter / ((count - 1.0) * count * size * size)
         };
-        let together = libm::pow(count, -GAIN / dimension.pick(2.0, 3.0));
+        let together = variance_together(count, dimension);
         ((0..3).map(variance).fold(0.0, f64::max) * together).sqrt()
     }
 }

@@ -5,10 +5,10 @@ use std::iter::Sum;
 use std::ops::Add;
 
 /// Groups there are at least, once as many rays are known.
-const LEAST: usize = 8;
+pub(super) const LEAST: usize = 8;
 
 /// What rays bring, by group.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Groups<T> {
     /// The sum of each finished group.
     sums: [T; 2 * LEAST],
@@ -24,6 +24,13 @@ impl<T: Copy + Default + Add<Output = T> + Sum> Groups<T> {
     /// No rays yet.
     pub fn new() -> Self {
         Self { sums: [T::default(); 2 * LEAST], finished: 0, size: 1, begun: 0, open: T::default() }
+    }
+
+    /// The sums of as many groups as there are at least, of this size.
+    pub fn of(size: u32, sums: [T; LEAST]) -> Self {
+        let mut groups = Self { size, finished: LEAST, ..Self::new() };
+        groups.sums[..LEAST].copy_from_slice(&sums);
+        groups
     }
 
     /// The next rays, no more than there is [`room`](Self::room) for, and their sum.

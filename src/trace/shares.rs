@@ -1,7 +1,7 @@
 //! How sure a sampled value is whose rays are let through in part: [`Accumulator`](super::estimate::Accumulator) for numbers
 //! between 0 and 1. Of rays that are let through whole or not at all it gives the same bits.
 
-use super::estimate::{Estimate, GAIN, bound};
+use super::estimate::{Estimate, bound, variance_together};
 use super::groups::Groups;
 use super::noise;
 use super::sampling::{Sampler, Target};
@@ -44,7 +44,7 @@ impl Shares {
         let variance = match self.even_in {
             None => self.variance_of_rays().max(bound(self.rays()).powi(2)),
             Some(dimension) => {
-                let together = libm::pow(rays / f64::from(self.groups.size()), -GAIN / dimension.pick(2.0, 3.0));
+                let together = variance_together(rays / f64::from(self.groups.size()), dimension);
                 let value = (self.sum() + 0.5) / (rays + 1.0);
                 (self.variance_of_groups() * together).max(0.5 * noise::of_even_rays(dimension, value, rays))
             }

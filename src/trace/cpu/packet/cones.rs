@@ -107,9 +107,10 @@ impl<const D: usize> Cones<D> {
         self.unoriented &= !(1 << lane);
     }
 
-    /// The bound on the last facet value of a lane, or none if it holds nothing.
-    pub fn last_bound(&self, lane: usize) -> Option<f32> {
-        (self.bounds[0][lane] != NOTHING).then_some(self.bounds[D - 1][lane])
+    /// The bounds on the last facet values, and the lanes that hold something.
+    #[inline(always)]
+    pub fn last_bounds<L: Lanes>(&self) -> (L, u8) {
+        (L::load(&self.bounds[D - 1]), !L::load(&self.bounds[0]).negative())
     }
 
     #[inline(always)]

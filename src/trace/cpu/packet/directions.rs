@@ -130,8 +130,12 @@ impl<const D: usize> Rays<D> {
     pub fn set(&mut self, directions: &[Vector<D>], normal: &Vector<D>) {
         debug_assert!(directions.iter().all(|d| d.norm_squared() < 1.0 + 1e-5));
         for (i, direction) in directions.iter().enumerate().take(BLOCK) {
-            (0..D).for_each(|k| self.direction[k][i] = direction[k]);
-            self.height[i] = direction.dot(normal);
+            let mut height = 0.0;
+            for k in 0..D {
+                self.direction[k][i] = direction[k];
+                height += direction[k] * normal[k];
+            }
+            self.height[i] = height;
         }
     }
 

@@ -35,6 +35,10 @@ pub(super) trait Lanes: Copy {
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
+    /// Its sign bits are those set in either; of the rest nothing is promised.
+    fn or(self, other: Self) -> Self;
+    /// `inside` in the lanes of the mask, `outside` in the others.
+    fn by_mask(mask: u8, inside: f32, outside: f32) -> Self;
     /// Each lane with its sign turned where `sign` is negative.
     fn turned_by(self, sign: Self) -> Self;
     /// The lanes of `negative` where the sign bit of `self` is set, of `other` where it isn't.
@@ -47,8 +51,6 @@ pub(super) trait Lanes: Copy {
     /// Adds the bits of `bit` to the words where `self` is less than or equal to `other`.
     fn mark(self, other: Self, bit: u32, marks: Self::Marks) -> Self::Marks;
     fn words(marks: Self::Marks) -> Words;
-    /// The words in which some bit of either is set.
-    fn any_marked(marks: [Self::Marks; 2]) -> u8;
     /// Writes those of the eight words that the mask names side by side to the front of `out`; what follows them there is
     /// overwritten too.
     fn compress(words: &Words, mask: u8, out: &mut Words);
@@ -143,6 +145,16 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        self.zip(other, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
+    }
+
+    #[inline(always)]
+    fn by_mask(mask: u8, inside: f32, outside: f32) -> Self {
+        Self(std::array::from_fn(|i| if mask >> i & 1 == 1 { inside } else { outside }))
+    }
+
+    #[inline(always)]
     fn turned_by(self, sign: Self) -> Self {
         self.zip(sign, |a, s| f32::from_bits(a.to_bits() ^ (s.to_bits() & (1 << 31))))
     }
@@ -175,11 +187,6 @@ impl Lanes for Portable {
     #[inline(always)]
     fn words(marks: Words) -> Words {
         marks
-    }
-
-    #[inline(always)]
-    fn any_marked([one, other]: [Words; 2]) -> u8 {
-        (0..WIDTH).fold(0, |mask, i| mask | (u8::from(one[i] | other[i] != 0) << i))
     }
 
     #[inline(always)]

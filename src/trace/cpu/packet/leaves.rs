@@ -45,8 +45,11 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
         highest = highest.max(height.add(dot(edge, &normal)));
     }
     let mut aside = highest.less_or_equal(L::splat(view.low(query)));
-    if view.distance == 0.0 && !query.around.is_empty() && has_corner_at_origin(&columns) {
-        aside |= query.around_lanes(&leaf);
+    if view.distance == 0.0 && query.vertex.is_some() {
+        let lanes = with_corner_at_origin(&columns) & !aside;
+        if lanes != 0 {
+            aside |= query.around_lanes(&leaf, lanes);
+        }
     }
     if !query.ignored.is_empty() {
         aside |= query.ignored_lanes(&leaf);
@@ -65,18 +68,15 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
     let [facet, flat] = view.bounds::<D>(Dimension::of::<D>().pick(SET_ROUNDING[0], SET_ROUNDING[1]));
     let (normals, determinant) = facet_normals(&columns);
     let unoriented = determinant.abs().less_or_equal(L::splat(flat)) & !aside;
-    let mut outside = [-facet; WIDTH];
-    for lane in 0..WIDTH {
-        outside[lane] = if aside >> lane & 1 == 1 { f32::INFINITY } else { -facet };
-    }
-    let outside = L::load(&outside);
+    // What is added to facet values, so that those of what is surely outside are negative.
+    let margin = if aside == 0 { L::splat(facet) } else { L::by_mask(aside, f32::NEG_INFINITY, facet) };
     let mut candidates = 0;
     let mut rest = set;
     while rest != 0 {
         let i = rest.trailing_zeros() as usize;
         rest &= rest - 1;
-        let [least, _] = extremes::<L, D>(&normals, &rays.splat(i));
-        candidates |= u64::from(least.less_or_equal(outside) != u8::MAX) << i;
+        let outside = any_negative::<L, D>(&normals, &rays.splat(i), margin);
+        candidates |= u64::from(outside.negative() != u8::MAX) << i;
     }
     if unoriented != 0 {
         candidates = set;
@@ -89,7 +89,7 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
         let inside = L::splat(facet);
         let surely = !least.less_or_equal(inside) & !unoriented & !aside;
         let turned = unoriented & greatest.less_or_equal(inside);
-        let perhaps = (!least.less_or_equal(outside) | turned) & !aside;
+        let perhaps = (!least.less_or_equal(L::splat(-facet)) | turned) & !aside;
         let hit =
             (surely != 0 && query.limit == f32::INFINITY) || (perhaps != 0 && exactly(query, rays, &leaf, perhaps, i));
         hits |= u64::from(hit) << i;
@@ -97,9 +97,9 @@ pub(super) fn hits_of_set<L: Lanes, const D: usize>(
     hits
 }
 
-/// Whether a corner seems to be where the origin is.
+/// The lanes with a corner that seems to be where the origin is; all that have one are among them.
 #[inline(always)]
-fn has_corner_at_origin<L: Lanes, const D: usize>(columns: &[[L; D]; D]) -> bool {
+fn with_corner_at_origin<L: Lanes, const D: usize>(columns: &[[L; D]; D]) -> u8 {
     let mut nearest = L::splat(f32::INFINITY);
     for corner in 0..D {
         let mut distance = L::splat(0.0);
@@ -109,7 +109,7 @@ fn has_corner_at_origin<L: Lanes, const D: usize>(columns: &[[L; D]; D]) -> bool
         }
         nearest = nearest.min(distance);
     }
-    nearest.less_or_equal(L::splat(0.0)) != 0
+    nearest.less_or_equal(L::splat(0.0))
 }
 
 /// How steep a way from the origin to simplices may be that aren't aside: its height over the tangent hyperplane to what it
@@ -152,6 +152,20 @@ fn steepest<L: Lanes, const D: usize>(view: &View, columns: &[[L; D]; D], normal
         steepest = if aside >> lane & 1 == 0 && slopes[lane] > steepest { slopes[lane] } else { steepest };
     }
     if steepest < 1e6 { steepest } else { 1e6 }
+}
+
+/// Its sign is set where some facet value of the direction is negative though the margin is added.
+#[inline(always)]
+fn any_negative<L: Lanes, const D: usize>(normals: &[[L; D]; D], direction: &[L; D], margin: L) -> L {
+    let mut signs = margin;
+    for (n, normal) in normals.iter().enumerate() {
+        let mut value = margin;
+        for k in 0..D {
+            value = normal[k].mul_add(direction[k], value);
+        }
+        signs = if n == 0 { value } else { signs.or(value) };
+    }
+    signs
 }
 
 /// The least and the greatest of the facet values of a direction.

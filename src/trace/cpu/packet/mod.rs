@@ -15,6 +15,7 @@
 //! - [`cones`]: eight simplices as cones seen from the shading point;
 //! - [`tracer`]: all of this, point after point.
 
+mod boxes;
 mod cones;
 mod directions;
 mod lanes;

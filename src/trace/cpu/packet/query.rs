@@ -21,9 +21,9 @@ pub(super) struct Query<'t, const D: usize> {
     pub limit: f32,
     /// The simplices that rays don't hit.
     pub ignored: &'t [u32],
-    /// Those that have a corner where the rays start, ascending; none unless that is a vertex. They are never hit, and left out
+    /// The identity of the vertex that the rays start from, if they do. Simplices with a corner there are never hit, and left out
     /// before that is asked.
-    pub around: &'t [u32],
+    pub vertex: Option<u32>,
 }
 
 impl<'t, const D: usize> Query<'t, D> {
@@ -32,7 +32,8 @@ impl<'t, const D: usize> Query<'t, D> {
         position: Vector<D>,
         (normal, rise): (Vector<D>, f32),
         limit: f32,
-        [ignored, around]: [&'t [u32]; 2],
+        ignored: &'t [u32],
+        vertex: Option<u32>,
     ) -> Self {
         let wide = tracer.wide();
         let rows = wide.rows();
@@ -46,7 +47,7 @@ impl<'t, const D: usize> Query<'t, D> {
             rise,
             limit,
             ignored,
-            around,
+            vertex,
         }
     }
 
@@ -69,26 +70,28 @@ impl<'t, const D: usize> Query<'t, D> {
     /// The lanes of a leaf with simplices that are to be ignored.
     #[inline(never)]
     pub fn ignored_lanes(&self, leaf: &Leaf<D>) -> u8 {
-        self.lanes(leaf, |simplex| self.ignored.contains(&simplex))
+        self.lanes(leaf, u8::MAX, |simplex| self.ignored.contains(&simplex))
     }
 
-    /// The lanes of a leaf with simplices that have a corner at the vertex that rays start from.
+    /// Those of these lanes of a leaf whose simplices have a corner at the vertex that rays start from.
     #[inline(never)]
-    pub fn around_lanes(&self, leaf: &Leaf<D>) -> u8 {
-        self.lanes(leaf, |simplex| self.around.binary_search(&simplex).is_ok())
+    pub fn around_lanes(&self, leaf: &Leaf<D>, lanes: u8) -> u8 {
+        let mesh = self.tracer.mesh();
+        let there = |&corner: &u32| Some(mesh.identity[corner as usize]) == self.vertex;
+        self.lanes(leaf, lanes, |simplex| mesh.simplices[simplex as usize].iter().any(there))
     }
 
-    /// The lanes for which this holds, unused ones as the last.
-    fn lanes(&self, leaf: &Leaf<D>, holds: impl Fn(u32) -> bool) -> u8 {
+    /// Those of these lanes for which this holds, unused ones as the last.
+    fn lanes(&self, leaf: &Leaf<D>, lanes: u8, holds: impl Fn(u32) -> bool) -> u8 {
         let simplices = &self.wide.order[leaf.range()];
-        let mut lanes = 0;
+        let mut found = 0;
         for (lane, &simplex) in simplices.iter().enumerate() {
-            if holds(simplex) {
+            if lanes >> lane & 1 == 1 && holds(simplex) {
                 let last = lane + 1 == simplices.len();
-                lanes |= if last { u8::MAX << lane } else { 1 << lane };
+                found |= if last { u8::MAX << lane } else { 1 << lane };
             }
         }
-        lanes
+        found
     }
 
     /// The limit in the coordinates of the boxes, and a little more.

@@ -22,9 +22,8 @@ const HEIGHT_ROUNDING: f32 = 16.0 / (1 << 24) as f32;
 #[derive(Debug)]
 pub(super) struct VertexStar<const D: usize> {
     cones: Vec<Cones<D>>,
-    count: usize,
-    /// Nothing is hidden above this height.
-    height: f32,
+    /// Above which each eight hide nothing.
+    heights: Vec<f32>,
     normal: Vector<D>,
     /// From where the vertex is approached: the normal, or beside another face or body a way along the own one.
     approach: Vector<D>,
@@ -33,19 +32,12 @@ pub(super) struct VertexStar<const D: usize> {
 
 impl<const D: usize> VertexStar<D> {
     pub fn new() -> Self {
-        Self {
-            cones: Vec::new(),
-            count: 0,
-            height: -1.0,
-            normal: Vector::zeros(),
-            approach: Vector::zeros(),
-            identity: 0,
-        }
+        Self { cones: Vec::new(), heights: Vec::new(), normal: Vector::zeros(), approach: Vector::zeros(), identity: 0 }
     }
 
     /// For a point with no simplex around it.
     pub fn clear(&mut self) {
-        (self.count, self.height) = (0, -1.0);
+        self.heights.clear();
     }
 
     /// For a vertex, with the simplices around it.
@@ -60,16 +52,12 @@ impl<const D: usize> VertexStar<D> {
         self.clear();
         (self.normal, self.approach, self.identity) = (normal, approach, identity);
         for simplices in around.chunks(WIDTH) {
-            if self.cones.len() == self.count {
+            if self.cones.len() == self.heights.len() {
                 self.cones.push(Cones::new());
             }
             let height = self.set_block::<L>(query, simplices);
-            self.height = self.height.max(height);
-            self.count += 1;
-        }
-        if approach != normal {
-            // Then the cones are as high as may be.
-            self.height = 1.0;
+            // If not approached from straight above, the cones are as high as may be.
+            self.heights.push(if approach == normal { height } else { 1.0 });
         }
     }
 
@@ -107,42 +95,41 @@ impl<const D: usize> VertexStar<D> {
                 maybe = maybe.max(height.add(bound));
             }
         }
-        let cones = &mut self.cones[self.count];
+        let cones = &mut self.cones[self.heights.len()];
         // A simplex that rises nowhere hides nothing; where that isn't sure, the exact cone is asked.
         let [determinants, squares] = cones.set(&edges, maybe);
         for lane in simplices.len()..WIDTH {
             cones.remove(lane);
         }
         cones.trusted &= !surely.less_or_equal(L::splat(0.0));
-        let (mut determinant, mut square) = ([0.0; WIDTH], [0.0; WIDTH]);
-        determinants.store(&mut determinant);
-        squares.store(&mut square);
-        (0..WIDTH)
-            .filter_map(|lane| Some(highest(determinant[lane], square[lane], cones.last_bound(lane)?)))
-            .fold(-1.0, f32::max)
+        let (bounds, holding) = cones.last_bounds::<L>();
+        let mut heights = [0.0; WIDTH];
+        highest(determinants, squares, bounds).store(&mut heights);
+        let mut height = -1.0;
+        for lane in 0..WIDTH {
+            height = if holding >> lane & 1 == 1 && heights[lane] > height { heights[lane] } else { height };
+        }
+        height
     }
 
     /// Which of the rays are hidden.
     #[inline(always)]
     pub fn hidden<L: Lanes>(&self, query: &Query<D>, rays: &Rays<D>, around: &[u32], alive: u64) -> u64 {
-        if self.count == 0 {
-            return 0;
-        }
-        let mut low = alive & rays.up_to_height::<L>(self.height);
         let mut hidden = 0;
-        while low != 0 {
-            let i = low.trailing_zeros() as usize;
-            low &= low - 1;
-            let direction = rays.splat::<L>(i);
-            for (cones, simplices) in self.cones[..self.count].iter().zip(around.chunks(WIDTH)) {
+        for ((cones, &height), simplices) in self.cones.iter().zip(&self.heights).zip(around.chunks(WIDTH)) {
+            let mut low = alive & !hidden & rays.up_to_height::<L>(height);
+            while low != 0 {
+                let i = low.trailing_zeros() as usize;
+                let bit = low & low.wrapping_neg();
+                low &= low - 1;
+                let direction = rays.splat::<L>(i);
                 let candidates = cones.candidates::<L>(&direction);
                 if candidates == 0 {
                     continue;
                 }
                 let verdict = cones.judge::<L>(candidates, &direction);
                 if verdict.inside != 0 || self.exactly(query, rays, i, simplices, verdict.doubtful) {
-                    hidden |= 1 << i;
-                    break;
+                    hidden |= bit;
                 }
             }
         }
@@ -163,9 +150,11 @@ impl<const D: usize> VertexStar<D> {
 /// An upper bound of the sine of the angle between the tangent hyperplane and that of a simplex, given the determinant of
 /// its edges and -n, the square of its own normal m, and a bound on the rounding of m . w for any w of length 1.
 #[inline(always)]
-fn highest(determinant: f32, square: f32, bound: f32) -> f32 {
+fn highest<L: Lanes>(determinant: L, square: L, bound: L) -> L {
+    let [zero, one] = [0.0, 1.0].map(L::splat);
     // The determinant is m . n but for rounding: of m, and as much again for each unit of the 1-norm of n.
-    let cosine = (determinant.abs() - 3.0 * bound) / (square.sqrt() * 1.00001 + 2.0 * bound);
-    let cosine = cosine.clamp(0.0, 1.0);
-    (1.0 - cosine * cosine).max(0.0).sqrt() + 1e-5
+    let sure = L::splat(3.0).negated_mul_add(bound, determinant.abs());
+    let length = square.square_root().mul(L::splat(1.00001)).add(L::splat(2.0).mul(bound));
+    let cosine = sure.max(zero).div(length).min(one);
+    cosine.negated_mul_add(cosine, one).max(zero).square_root().add(L::splat(1e-5))
 }

@@ -136,7 +136,8 @@ impl<const D: usize> PacketTracer<D> {
             ShadingPoint::Inside { .. } => None,
         };
         let ignored = point.ignored(tracer);
-        let query = Query::new(tracer, position, (normal, RISE), sampling.max_distance, [&ignored, around]);
+        let identity = vertex.as_ref().map(|at| at.identity);
+        let query = Query::new(tracer, position, (normal, RISE), sampling.max_distance, &ignored, identity);
         let source = Source::Sequence {
             sequence: Sequence::new(sampling.sampler, sampling.seed, point.number()),
             frame: Frame::new(&normal),
@@ -163,9 +164,10 @@ impl<const D: usize> PacketTracer<D> {
             return rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
         }
         // Left out only if all rays surely are on its side.
-        let on_side = directions.iter().all(|d| d.dot(&normal) > 1e-5);
+        let lowest = directions.iter().map(|d| d.dot(&normal)).fold(f32::INFINITY, |a, b| if b < a { b } else { a });
+        let on_side = lowest > 1e-5;
         let normal = if on_side { normal } else { Vector::zeros() };
-        let query = Query::new(tracer, *origin, (normal, 0.0), limit, [ignored.as_slice(), &[]]);
+        let query = Query::new(tracer, *origin, (normal, 0.0), limit, ignored.as_slice(), None);
         let source = Source::Directions(directions);
         // Nobody cancels.
         let found = self.traced(Job { query, vertex: None, source, watch: None, progress: &Silent });

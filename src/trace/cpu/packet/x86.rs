@@ -140,20 +140,28 @@ macro_rules! arithmetic {
         }
 
         #[inline(always)]
-        fn any_marked([one, other]: [__m256i; 2]) -> u8 {
-            // SAFETY: AVX2 by the level.
-            unsafe {
-                let none = _mm256_cmpeq_epi32(_mm256_or_si256(one, other), _mm256_setzero_si256());
-                !(_mm256_movemask_ps(_mm256_castsi256_ps(none)) as u8)
-            }
-        }
-
-        #[inline(always)]
         fn fetch<const D: usize>(rows: &[Row], place: usize) {
             let start = rows.as_ptr().wrapping_add(place).cast::<i8>();
             for line in 0..5 {
                 // SAFETY: SSE by the level; a prefetch may be of any address.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
+            }
+        }
+
+        #[inline(always)]
+        fn or(self, other: Self) -> Self {
+            // SAFETY: AVX by the level.
+            Self(unsafe { _mm256_or_ps(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn by_mask(mask: u8, inside: f32, outside: f32) -> Self {
+            // SAFETY: AVX2 by the level.
+            unsafe {
+                let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                let masked = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(i32::from(mask)), bits), bits);
+                let [inside, outside] = [_mm256_set1_ps(inside), _mm256_set1_ps(outside)];
+                Self(_mm256_blendv_ps(outside, inside, _mm256_castsi256_ps(masked)))
             }
         }
 
