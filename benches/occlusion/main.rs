@@ -138,7 +138,11 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
     for &samples in &options.rays {
         let table = rays::pattern::<D>(samples);
         let pattern = folder.join(format!("pattern{D}_{samples}"));
-        std::fs::write(&pattern, table.iter().flatten().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>()).unwrap();
+        std::fs::write(
+            &pattern,
+            table.iter().flat_map(|p| &p[..D - 1]).flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>(),
+        )
+        .unwrap();
         let list = rays::work_list(mesh.vertices.len(), samples, options.max_rays);
         let sampling = Sampling::new(samples as u32, 1);
         let mut packets = PacketTracer::<D>::new(options.level);

@@ -27,8 +27,8 @@ impl Pcg32 {
 }
 
 /// `n` points of the unit (D-1)-ball, one in each cell of a recursive median split, so that neighbours in the list are
-/// neighbours in the ball.
-pub fn pattern<const D: usize>(n: usize) -> Vec<Vec<f32>> {
+/// neighbours in the ball; each with the height of the hemisphere over it.
+pub fn pattern<const D: usize>(n: usize) -> Vec<[f32; D]> {
     const OVER: usize = 32;
     let mut random = Pcg32::new(12345 + D as u64);
     let mut points = Vec::new();
@@ -40,7 +40,8 @@ pub fn pattern<const D: usize>(n: usize) -> Vec<Vec<f32>> {
     }
     let mut table = Vec::new();
     split(&mut points, OVER, &mut random, &mut table);
-    table
+    let height = |p: &[f32]| (1.0 - p.iter().map(|x| x * x).sum::<f32>()).max(0.0).sqrt();
+    table.iter().map(|p| std::array::from_fn(|k| if k < D - 1 { p[k] } else { height(p) })).collect()
 }
 
 fn split(points: &mut [Vec<f32>], over: usize, random: &mut Pcg32, table: &mut Vec<Vec<f32>>) {
@@ -94,7 +95,7 @@ pub fn work_list(vertices: usize, n: usize, max_rays: f64) -> Vec<u32> {
 }
 
 /// The directions for one vertex.
-pub fn directions<const D: usize>(table: &[Vec<f32>], vertex: u32, n: &Vector<D>, out: &mut Vec<Vector<D>>) {
+pub fn directions<const D: usize>(table: &[[f32; D]], vertex: u32, n: &Vector<D>, out: &mut Vec<Vector<D>>) {
     let mut t = [Vector::<D>::zeros(); 3];
     let s = 1f32.copysign(n[D - 1]);
     let mut r = Pcg32::new(u64::from(vertex));
@@ -144,12 +145,15 @@ pub fn directions<const D: usize>(table: &[Vec<f32>], vertex: u32, n: &Vector<D>
         (0..3).for_each(|i| t[i] = old[0] * m[i][0] + old[1] * m[i][1] + old[2] * m[i][2]);
     }
     out.clear();
-    out.extend(table.iter().map(|p| {
-        let z = (1.0 - p.iter().map(|x| x * x).sum::<f32>()).max(0.0).sqrt();
-        Vector::from_fn(|d, _| {
-            let mut q = z * n[d];
-            (0..D - 1).for_each(|k| q += p[k] * t[k][d]);
-            q
-        })
+    out.extend(table.iter().map(|point| {
+        // The point of the ball, and how high the hemisphere is over it.
+        let (p, z) = (&point[..D - 1], point[D - 1]);
+        let mut q = *n * z;
+        for k in 0..D - 1 {
+            for d in 0..D {
+                q[d] += p[k] * t[k][d];
+            }
+        }
+        q
     }));
 }

@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use ao4d::geometry::Dimension;
 use ao4d::pipeline::Pipeline;
+use ao4d::scene::OneOrEach;
 use ao4d::stages::animate::AnimatePlan;
 use ao4d::stages::occlusion::{OcclusionPlan, OcclusionSource, Samples};
 use ao4d::stages::render::RenderPlan;
+use ao4d::stages::scene::ScenePlan;
 
 /// All `.yaml` files below `pipelines/`.
 pub fn pipelines() -> Vec<PathBuf> {
@@ -27,10 +29,28 @@ pub fn pipelines() -> Vec<PathBuf> {
     found
 }
 
-/// Overrides that make images of a pipeline smaller, its films shorter, and its rays fewer. Every stage still does its work.
+/// Cells of an isosurface that is coarse enough for tests.
+const CELLS: u32 = 14;
+
+/// Overrides that make images of a pipeline smaller, its films shorter, its rays fewer and its isosurfaces coarser. Every stage still
+/// does its work.
 pub fn smaller(path: &Path) -> Vec<String> {
     let plan = Pipeline::load(path, &[], None).unwrap().plan;
     let mut overrides = Vec::new();
+    for (stage, scene) in plan.all::<ScenePlan>() {
+        for (i, object) in scene.objects.iter().enumerate() {
+            let Some(isosurface) = &object.isosurface else { continue };
+            let Some(OneOrEach::One(cells @ CELLS..)) = isosurface.grid.as_ref().map(|grid| &grid.cells) else {
+                continue;
+            };
+            let least = if scene.dimension == Dimension::Three { cells / 2 } else { CELLS };
+            let object = format!("{}.objects.{i}.isosurface", plan.path(stage));
+            overrides.push(format!("{object}.grid.cells={least}"));
+            if let Some(component) = isosurface.smallest_component {
+                overrides.push(format!("{object}.smallest_component={}", component / 8));
+            }
+        }
+    }
     for (stage, render) in plan.all::<RenderPlan>() {
         let flat = plan[render.scene].dimension == Dimension::Three;
         let most = if flat { 120 } else { 36 };

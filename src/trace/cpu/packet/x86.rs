@@ -142,7 +142,8 @@ macro_rules! arithmetic {
         #[inline(always)]
         fn fetch<const D: usize>(rows: &[Row], place: usize) {
             let start = rows.as_ptr().wrapping_add(place).cast::<i8>();
-            for line in 0..5 {
+            // A node's lines; most of a leaf's.
+            for line in 0..D + 1 {
                 // SAFETY: SSE by the level; a prefetch may be of any address.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) }
             }
