@@ -66,11 +66,8 @@ impl<const D: usize> Tracer<D> {
         let wide = match self.bvh.get() {
             Some(bvh) => WideBvh::new(bvh, &self.mesh, true),
             None => {
-                let bvh = self.build(true);
-                let wide = WideBvh::new(&bvh, &self.mesh, true);
-                if !wide.is_whole() {
-                    let _ = self.bvh.set(bvh);
-                }
+                let (wide, needed) = WideBvh::replacing(self.build(true), &self.mesh, true);
+                needed.into_iter().for_each(|bvh| _ = self.bvh.set(bvh));
                 wide
             }
         };
