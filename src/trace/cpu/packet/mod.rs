@@ -9,6 +9,7 @@
 //! - [`directions`]: the rays of a shading point, 64 at a time;
 //! - [`star`]: what the simplices around a vertex hide;
 //! - [`traverse`]: the rays through the [`crate::accel::WideBvh`];
+//! - [`boxes`]: sets of rays against the boxes of a node;
 //! - [`leaves`]: sets of rays against the simplices of a leaf, and what is left in doubt;
 //! - [`view`]: how a leaf lies to the origin;
 //! - [`single`]: one ray against the simplices of a leaf;

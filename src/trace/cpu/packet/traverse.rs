@@ -1,14 +1,13 @@
 //! The rays of a block through the hierarchy.
 //!
-//! They start as one set and descend together as long as they stay together. While at least [`FEW`] rays meet a node, its eight
-//! boxes, less the origin, stay in registers, and ray after ray is tested against all eight at once: three products for each
-//! axis. Each box has a word, to which a ray that meets it adds its bit: that is the set of rays of that child.
+//! They start as one set and descend together as long as they stay together: while at least [`FEW`] rays meet a node, or
+//! [`FEW_AT_LEAF`] a leaf, it is asked for all of them at once ([`super::boxes`], [`super::leaves`]).
 //!
-//! Where fewer rays meet a node, a set would cost more than it saves. Such rays get the node on a stack of their own. In the end
-//! all rays that are left go in step. A step takes what is on top of a ray's stack. If it is a node, the children that
-//! the ray meets are put in its place, leaves last. By what is on top afterwards the ray joins the list of those at a node
-//! or the list of those at a leaf for the next round; a ray that is blocked, or has nothing left, joins neither. So a step
-//! has no branch that a processor could guess wrong, and what the next round needs is fetched a whole round ahead.
+//! Where fewer rays meet a node, a set would cost more than it saves. Such rays get the node on a stack of their own, and go on from
+//! there when no set is left. A step takes what is on top of a ray's stack. If it is a node, the children that
+//! the ray meets are put in its place, leaves last. By what is on top afterwards the ray joins the queue of those at a node
+//! or the queue of those at a leaf; a ray that is blocked, or has nothing left, joins neither. So a step
+//! has no branch that a processor could guess wrong, and what a ray needs next is fetched while the others in its queue have their turn.
 
 use super::boxes::{AHEAD, APART, meet_set};
 use super::directions::{BLOCK, Rays};
