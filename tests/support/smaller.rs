@@ -44,7 +44,7 @@ pub fn smaller(path: &Path) -> Vec<String> {
                 continue;
             };
             let least = if scene.dimension == Dimension::Three { cells / 2 } else { CELLS };
-            let object = format!("{}.objects.{i}.isosurface", plan.path(stage));
+            let object = format!("{}.objects[{i}].isosurface", plan.path(stage));
             overrides.push(format!("{object}.grid.cells={least}"));
             if let Some(component) = isosurface.smallest_component {
                 overrides.push(format!("{object}.smallest_component={}", component / 8));
