@@ -137,11 +137,9 @@ impl<const D: usize> WideBvh<D> {
     pub fn new(bvh: &Bvh<D>, mesh: &Mesh<D>, parallel: bool) -> Self {
         let scale = Scale::of(&mesh.vertices);
         let plan = Plan::new(&bvh.nodes, &scale);
-        if plan.fine {
-            return Self::over(&bvh.nodes, &plan, bvh.order.clone(), mesh, scale, parallel);
-        }
         let bounds = |simplex| Aabb::of(&mesh.corners(simplex));
-        let Some((near, far)) = apart::parts(&bvh.order, bounds, COARSE) else {
+        let parts = if plan.fine { None } else { apart::parts(&bvh.order, bounds, COARSE) };
+        let Some((near, far)) = parts else {
             return Self::over(&bvh.nodes, &plan, bvh.order.clone(), mesh, scale, parallel);
         };
         let near = Bvh::build(&near, bounds, parallel);

@@ -43,9 +43,9 @@ pub fn smaller(path: &Path) -> Vec<String> {
             let Some(OneOrEach::One(cells @ CELLS..)) = isosurface.grid.as_ref().map(|grid| &grid.cells) else {
                 continue;
             };
-            let least = if scene.dimension == Dimension::Three { cells / 2 } else { CELLS };
+            let coarse = if scene.dimension == Dimension::Three { cells / 2 } else { CELLS };
             let object = format!("{}.objects[{i}].isosurface", plan.path(stage));
-            overrides.push(format!("{object}.grid.cells={least}"));
+            overrides.push(format!("{object}.grid.cells={coarse}"));
             if let Some(component) = isosurface.smallest_component {
                 overrides.push(format!("{object}.smallest_component={}", component / 8));
             }
