@@ -6,7 +6,7 @@
 use std::cmp::Ordering;
 use std::sync::{Arc, OnceLock};
 
-use super::{Bvh, WideBvh};
+use super::{Bvh, Places, WideBvh};
 use crate::geometry::{Aabb, Cone, Crossing, Ray, Vector};
 use crate::mesh::{Incidence, Mesh};
 
@@ -18,6 +18,7 @@ pub struct Tracer<const D: usize> {
     bvh: OnceLock<Bvh<D>>,
     wide: OnceLock<WideBvh<D>>,
     incidence: OnceLock<Incidence>,
+    places: OnceLock<Places>,
 }
 
 /// The simplex that a ray hits first.
@@ -34,7 +35,13 @@ pub struct Hit<const D: usize> {
 impl<const D: usize> Tracer<D> {
     /// Builds nothing yet.
     pub fn new(mesh: impl Into<Arc<Mesh<D>>>) -> Self {
-        Self { mesh: mesh.into(), bvh: OnceLock::new(), wide: OnceLock::new(), incidence: OnceLock::new() }
+        Self {
+            mesh: mesh.into(),
+            bvh: OnceLock::new(),
+            wide: OnceLock::new(),
+            incidence: OnceLock::new(),
+            places: OnceLock::new(),
+        }
     }
 
     /// The mesh it was made of.
@@ -86,6 +93,11 @@ impl<const D: usize> Tracer<D> {
             (None, Some(wide)) => &wide.order,
             _ => &self.bvh().order,
         }
+    }
+
+    /// Where simplices and vertices are in that order; made when first asked for.
+    pub fn places(&self) -> &Places {
+        self.places.get_or_init(|| Places::new(&self.mesh, self.spatial_order()))
     }
 
     /// Calls `visit` for all simplices, and maybe some others, whose boxes are within `room` of the point on each axis.

@@ -4,6 +4,8 @@
 //! Sorted, its indices are the same from whichever simplex it is looked at; the parity of the sort, and of the place of
 //! the corner left out, is its orientation. So a sort of all facets brings the neighbours together.
 
+use rayon::prelude::*;
+
 /// The corners of a facet, ascending; in 3D the last is `u32::MAX`.
 pub type Corners = [u32; 3];
 
@@ -47,12 +49,11 @@ pub fn facets_of<const D: usize>(simplex: &[u32; D]) -> impl Iterator<Item = (Co
 
 /// The facets of all simplices, sorted, so that those with the same corners stand together: `chunk_by` their corners.
 pub fn sorted_facets<const D: usize>(simplices: &[[u32; D]]) -> Vec<Facet> {
-    let mut facets = Vec::with_capacity(simplices.len() * D);
-    for (s, simplex) in simplices.iter().enumerate() {
-        let simplex_facets = facets_of(simplex);
-        facets.extend(simplex_facets.map(|(corners, turned)| Facet { corners, simplex: s as u32, turned }));
-    }
-    facets.sort_unstable();
+    let of_simplex = |(s, simplex): (usize, &[u32; D])| -> Vec<Facet> {
+        facets_of(simplex).map(|(corners, turned)| Facet { corners, simplex: s as u32, turned }).collect()
+    };
+    let mut facets: Vec<Facet> = simplices.par_iter().enumerate().flat_map_iter(of_simplex).collect();
+    facets.par_sort_unstable();
     facets
 }
 

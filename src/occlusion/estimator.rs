@@ -133,26 +133,12 @@ pub(super) fn spatial_order<const D: usize>(
     points: &[ShadingPoint<D>],
     mask: Option<&[bool]>,
 ) -> Vec<usize> {
-    const LAST: u32 = u32::MAX;
-    let mesh = tracer.mesh();
-    let (mut of_simplex, mut of_vertex) = (vec![LAST; mesh.simplices.len()], vec![LAST; mesh.vertices.len()]);
-    for (place, &simplex) in (0..).zip(tracer.spatial_order()) {
-        of_simplex[simplex as usize] = place;
-        for vertex in mesh.simplices[simplex as usize] {
-            let first = &mut of_vertex[vertex as usize];
-            *first = place.min(*first);
-        }
-    }
-    for (copy, first) in mesh.copies.iter() {
-        let place = of_simplex[first as usize];
-        of_simplex[copy as usize] = place;
-        mesh.simplices[copy as usize].iter().for_each(|&v| of_vertex[v as usize] = place.min(of_vertex[v as usize]));
-    }
+    let places = tracer.places();
     let place = |i: usize| match points[i] {
-        ShadingPoint::Vertex(vertex) => of_vertex[vertex as usize],
-        ShadingPoint::Inside { simplex, .. } => of_simplex.get(simplex as usize).copied().unwrap_or(LAST),
+        ShadingPoint::Vertex(vertex) => places.of_vertex(vertex),
+        ShadingPoint::Inside { simplex, .. } => places.of_simplex(simplex),
     };
-    let asked = (0..points.len()).filter(|&i| mask.is_none_or(|mask| mask[i]));
+    let asked = (0..points.len()).into_par_iter().filter(|&i| mask.is_none_or(|mask| mask[i]));
     let mut order: Vec<(u32, usize)> = asked.map(|i| (place(i), i)).collect();
     order.par_sort_unstable();
     order.into_iter().map(|(_, i)| i).collect()
