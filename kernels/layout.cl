@@ -8,12 +8,10 @@ typedef struct {
     uint exponents;  /* of the axes, the first in the lowest byte */
     uint children;   /* the first child that is a node; the others follow it */
     uint simplices;  /* the first simplex of the leaves */
-    uint inner;      /* how many children are nodes */
+    uint counts;     /* in the lowest byte how many children are nodes, in the next how many children there are */
+    uint4 sides[4];  /* of each axis, a byte a child: low in the first eight, high in the others */
     uint2 leaves;    /* a byte a child; of a leaf 8 * (its first simplex, counted from `simplices`) + how many it has */
-    uint filled;     /* how many children there are */
-    uint padding;
-    uint2 low[4];    /* of each axis, a byte a child */
-    uint2 high[4];
+    uint padding[2];
 } Node;
 
 typedef struct {
@@ -26,7 +24,8 @@ typedef struct {
     uint star_first; /* the cones that the simplices around it hide */
     uint star_count;
     uint next;       /* the first ray's place in its sequence */
-    uint padding[2];
+    uint vertex;     /* the vertex in this place, or NONE */
+    float star_height; /* above which, over the tangent hyperplane, nothing is hidden by them */
 } Point;
 
 typedef struct {
@@ -48,7 +47,7 @@ __kernel void layout(__global uint *sizes) {
     StarCone cone;
     sizes[0] = sizeof(Node);
     sizes[1] = (uint)((uintptr_t)&node.leaves - (uintptr_t)&node);
-    sizes[2] = (uint)((uintptr_t)&node.high - (uintptr_t)&node);
+    sizes[2] = (uint)((uintptr_t)&node.sides - (uintptr_t)&node);
     sizes[3] = sizeof(Point);
     sizes[4] = (uint)((uintptr_t)&point.keys - (uintptr_t)&point);
     sizes[5] = (uint)((uintptr_t)&point.factor - (uintptr_t)&point);

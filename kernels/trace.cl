@@ -1,23 +1,79 @@
 /* Rays through the hierarchy that src/trace/opencl/wide.rs makes: nodes of eight boxes. The host tells DEPTH, how many nodes
    lie on its longest way from the root to a leaf. */
 
-/* In single precision and, where that leaves doubt and the device can, in double. */
-uint met(float4 position, float4 direction, __global const float4 *corners, float limit, float *t, float *t_error) {
-    /* Of a simplex with a corner here nothing is seen. */
-    for (int i = 0; i < D; i++)
-        if (all(corners[i] == position)) return OPEN;
-    float single_t, single_error;
-    uint found = meets_single(position, direction, corners, &single_t, &single_error);
-    *t = single_t;
-    *t_error = single_error;
-#ifdef DOUBLE
-    if (found == UNSURE) {
-        double double_t, double_error;
-        found = meets_double(position, direction, corners, &double_t, &double_error);
-        *t = (float)double_t;
-        *t_error = (float)double_error + *t * 1e-6f;
-    }
+#define SUM(v) (v.x + v.y + v.z + v.w)
+
+/* Whether a ray meets a simplex, in single precision, by what src/trace/opencl/facet.rs tells of it: HIT, OPEN or UNSURE. If
+   HIT, *t is the distance and *t_error bounds its rounding.
+
+   The ray's direction w is a sum of the corners as they are seen from its origin. With e the first of them, and the edges d1,
+   d2 and d3 from there, the weights have the signs of
+       det(e, w, d2, d3), det(e, d1, w, d3), det(e, d1, d2, w), and det(w, d1, d2, d3) less all of these,
+   times that of det(e, d1, d2, d3). The first three are sums of products of two minors, one of w and e and one of edges. */
+uint crossed(float4 position, float4 direction, __global const float4 *facet, float *t, float *t_error) {
+    /* More than all roundings: of e, of minors here and there, of six products, of sums, and of the bounds themselves. */
+    const float rounding = 24.0f * HALF_ULP, tiny = 1e-30f;
+    float4 w = direction, first = facet[0], normal = facet[1], e = first - position;
+#if D == 4
+    float xy = w.x * e.y - w.y * e.x, xz = w.x * e.z - w.z * e.x, xw = w.x * e.w - w.w * e.x;
+    float yz = w.y * e.z - w.z * e.y, yw = w.y * e.w - w.w * e.y, zw = w.z * e.w - w.w * e.z;
+    float4 f2 = facet[2], f3 = facet[3], f4 = facet[4], f5 = facet[5], f6 = facet[6];
+    float a = xy * f2.x + xz * f2.y + xw * f2.z + yz * f2.w + yw * f3.x + zw * f3.y;
+    float b = xy * f3.z + xz * f3.w + xw * f4.x + yz * f4.y + yw * f4.z + zw * f4.w;
+    float c = xy * f5.x + xz * f5.y + xw * f5.z + yz * f5.w + yw * f6.x + zw * f6.y;
+    float part = f6.z, size = f6.w;
+#else
+    float x = w.y * e.z - w.z * e.y, y = w.z * e.x - w.x * e.z, z = w.x * e.y - w.y * e.x;
+    float4 f2 = facet[2], f3 = facet[3];
+    float a = x * f2.x + y * f2.y + z * f2.z;
+    float b = x * f3.x + y * f3.y + z * f3.z;
+    float part = f2.w, size = f3.w;
 #endif
+    float4 w_size = fabs(w), e_size = fabs(e), whole_parts = w * normal, determinant_parts = e * normal;
+    float s_w = rounding * SUM(w_size), s_e = SUM(e_size);
+    float whole = SUM(whole_parts), whole_bound = s_w * size + tiny;
+    float determinant = SUM(determinant_parts), determinant_bound = rounding * s_e * size + tiny;
+    float bound = s_w * s_e * part + tiny;
+    /* What is not a number is in doubt. */
+    uint above = (a > bound) + (b > bound), below = (-a > bound) + (-b > bound);
+    float others = a + b;
+#if D == 4
+    above += c > bound;
+    below += -c > bound;
+    others += c;
+#endif
+    float last = whole - others, last_bound = whole_bound + (D - 1) * bound;
+    above += last > last_bound;
+    below += -last > last_bound;
+    if (above > 0 && below > 0) return OPEN;
+    if (above + below == 0) return UNSURE;
+    float oriented = above > 0 ? determinant : -determinant;
+    if (-oriented > determinant_bound) return OPEN;
+    if (!(oriented > determinant_bound) || above + below < D) return UNSURE;
+    *t = oriented / fabs(whole);
+    *t_error = 4.0f * *t * (whole_bound / fabs(whole) + determinant_bound / oriented + 4.0f * HALF_ULP);
+    return HIT;
+}
+
+/* The same, and where that leaves doubt, it is asked for and the device can, in double precision by the corners. Hits at
+   `limit` and beyond don't count. */
+uint met(
+    float4 position, float4 direction, __global const float4 *facet, __global const float4 *corners, float limit,
+    bool doubly, float *t, float *t_error) {
+    uint found = crossed(position, direction, facet, t, t_error);
+    if (found == UNSURE) {
+        /* Of a simplex with a corner here nothing is seen. */
+        for (int i = 0; i < D; i++)
+            if (all(corners[i] == position)) return OPEN;
+#ifdef DOUBLE
+        if (doubly) {
+            double double_t, double_error;
+            found = meets(position, direction, corners, &double_t, &double_error);
+            *t = (float)double_t;
+            *t_error = (float)double_error + *t * 1e-6f;
+        }
+#endif
+    }
     if (found != HIT || limit == INFINITY) return found;
     if (*t + *t_error < limit * (1.0f - 1e-6f)) return HIT;
     return *t - *t_error > limit * (1.0f + 1e-6f) ? OPEN : UNSURE;
@@ -30,9 +86,9 @@ float4 inverted(float4 direction) {
     return 1.0f / copysign(max(size, 1e-20f), direction);
 }
 
-/* Which of a node's boxes the ray enters before `limit`, a bit each, and the distances at which it does. Boxes are a little
-   larger than what they hold, and distances are taken a little wider than they are, more than any rounding: no box is missed
-   that holds a hit. Products of a byte and a power of two are exact, so the host knows the boxes to the bit. */
+/* Which of a node's boxes the ray enters before `limit`, a bit each, and distances before which it doesn't. Boxes are a little
+   larger than what they hold, and distances are taken wider than they are by more than any rounding: no box is missed that
+   holds a hit. Beside the products and sums here, whose rounding is below 1e-6 of `slack`'s factor, the reciprocals are rounded. */
 uint boxes(__global const Node *node, float4 position, float4 inverse, float limit, float8 *distances) {
     float8 enter = (float8)(0.0f), leave = (float8)(limit);
     float4 origin = node->origin;
@@ -41,47 +97,57 @@ uint boxes(__global const Node *node, float4 position, float4 inverse, float lim
     const float reciprocal[4] = {inverse.x, inverse.y, inverse.z, inverse.w};
     uint exponents = node->exponents;
     for (int axis = 0; axis < D; axis++) {
-        float step = as_float((exponents >> 8 * axis & 0xffu) << 23);
-        float8 low = from[axis] + convert_float8(as_uchar8(node->low[axis])) * step;
-        float8 high = from[axis] + convert_float8(as_uchar8(node->high[axis])) * step;
-        float8 a = (low - p[axis]) * reciprocal[axis], b = (high - p[axis]) * reciprocal[axis];
-        enter = max(enter, min(a, b));
-        leave = min(leave, max(a, b));
+        float step = as_float((exponents >> 8 * axis & 0xffu) << 23) * reciprocal[axis];
+        float start = (from[axis] - p[axis]) * reciprocal[axis];
+        float slack = (fabs(start) + 256.0f * fabs(step)) * 1e-6f;
+        uint4 sides = node->sides[axis];
+        uint2 near = step < 0.0f ? sides.zw : sides.xy, far = step < 0.0f ? sides.xy : sides.zw;
+        enter = max(enter, mad(convert_float8(as_uchar8(near)), (float8)(step), (float8)(start - slack)));
+        leave = min(leave, mad(convert_float8(as_uchar8(far)), (float8)(step), (float8)(start + slack)));
     }
     *distances = enter;
     int8 met = (enter * (1.0f - 2e-6f) <= leave * (1.0f + 2e-6f)) & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
     int4 half_ = met.lo | met.hi;
     int2 quarter = half_.lo | half_.hi;
-    return (uint)(quarter.x | quarter.y) & ((1u << node->filled) - 1u);
+    return (uint)(quarter.x | quarter.y);
 }
 
 /* The place of the lowest bit that is set, and the bits without it. */
 #define LOWEST(bits) (31u - clz((bits) & (0u - (bits))))
 #define WITHOUT_LOWEST(bits) ((bits) & ((bits) - 1u))
 
-/* A leaf's place among the simplices: the first, and how many. */
-uint2 range_of(__global const Node *node, uint child) {
-    uint byte = (child < 4 ? node->leaves.x : node->leaves.y) >> 8 * (child & 3u) & 0xffu;
-    return (uint2)(node->simplices + (byte >> 3), byte & 7u);
+/* The simplices of the leaves among these children: the first that the node has, and a bit for each from there on. */
+uint2 simplices_of(__global const Node *node, uint children) {
+    uint2 bytes = node->leaves;
+    uint bits = 0;
+    for (; children != 0; children = WITHOUT_LOWEST(children)) {
+        uint child = LOWEST(children);
+        uint byte = (child < 4 ? bytes.x : bytes.y) >> 8 * (child & 3u);
+        bits |= ((1u << (byte & 7u)) - 1u) << (byte >> 3 & 31u);
+    }
+    return (uint2)(node->simplices, bits);
 }
 
-/* The corners of a simplex. Devices take no more than so much memory in one piece, so a large mesh is in several. */
-#if PIECES == 1
-#define CORNERS(simplex) (corners_0 + D * (size_t)(simplex))
-#else
-#define CORNERS(simplex) corners_of(simplex, corners_0, corners_1, corners_2, corners_3)
-__global const float4 *corners_of(
-    uint simplex, __global const float4 *corners_0, __global const float4 *corners_1,
-    __global const float4 *corners_2, __global const float4 *corners_3) {
-    uint piece = simplex / PIECE, place = simplex % PIECE;
-    __global const float4 *corners =
-        piece < 2 ? (piece == 0 ? corners_0 : corners_1) : (piece == 2 ? corners_2 : corners_3);
-    return corners + D * (size_t)place;
-}
-#endif
+/* What is told of a simplex, and its corners. Devices take no more than so much memory in one piece, so a large mesh is in
+   several. */
+#define FACET (D == 4 ? 7 : 4)
 #define MESH \
-    __global const Node *nodes, __global const float4 *corners_0, __global const float4 *corners_1, \
-    __global const float4 *corners_2, __global const float4 *corners_3, __global const uint *simplices
+    __global const Node *nodes, __global const float4 *facets_0, __global const float4 *facets_1, \
+    __global const float4 *facets_2, __global const float4 *facets_3, __global const float4 *corners_0, \
+    __global const float4 *corners_1, __global const float4 *corners_2, __global const float4 *corners_3, \
+    __global const uint *simplices, __global const uint4 *vertices
+#define THE_MESH \
+    nodes, facets_0, facets_1, facets_2, facets_3, corners_0, corners_1, corners_2, corners_3, simplices, vertices
+#if PIECES == 1
+#define PLACE(simplex) (size_t)(simplex)
+#define PIECE_OF(simplex, name) name##_0
+#else
+#define PLACE(simplex) (size_t)((simplex) % PIECE)
+#define PIECE_OF(simplex, name) \
+    ((simplex) / PIECE < 2 ? ((simplex) / PIECE == 0 ? name##_0 : name##_1) : ((simplex) / PIECE == 2 ? name##_2 : name##_3))
+#endif
+#define FACET_OF(simplex) (PIECE_OF(simplex, facets) + FACET * PLACE(simplex))
+#define CORNERS(simplex) (PIECE_OF(simplex, corners) + D * PLACE(simplex))
 
 /* As geometry::Ray: components that would overflow the reciprocal are zero. */
 float4 cleaned(float4 direction) {
@@ -94,6 +160,9 @@ float4 cleaned(float4 direction) {
 
 /* What the simplices around the point hide. */
 uint hidden_by_star(Point point, float4 direction, __global const StarCone *star) {
+    float4 last = (float4)(0.0f, 0.0f, D == 3, D == 4);
+    float4 normal = last - point.factor * (D == 3 ? point.axis.z : point.axis.w) * point.axis;
+    if (fabs(dot(normal, direction)) > point.star_height) return OPEN;
     uint found = OPEN;
     float size = fabs(direction.x) + fabs(direction.y) + fabs(direction.z) + fabs(direction.w);
     for (uint i = 0; i < point.star_count; i++) {
@@ -112,85 +181,92 @@ uint hidden_by_star(Point point, float4 direction, __global const StarCone *star
     return found;
 }
 
-#ifdef SORTED
-/* Rays that go into the same direction are work for neighbours: they visit the same nodes. Of each group's rays the work-item
-   gets the one at its place in an order of directions, octant after octant. */
-size_t sorted(float4 direction, __local ushort *keys) {
-    uint local_place = (uint)get_local_id(0), key = 0;
-    const float w[4] = {direction.x, direction.y, direction.z, direction.w};
-    for (int axis = 0; axis < D; axis++) {
-        uint cell = (uint)clamp((w[axis] + 1.0f) * 2.0f, 0.0f, 3.0f);
-        key |= (cell >> 1) << (D + axis) | (cell & 1u) << axis;
-    }
-    keys[local_place] = (ushort)(key * GROUP + local_place);
-    for (uint size = 2; size <= GROUP; size <<= 1) {
-        for (uint step = size >> 1; step > 0; step >>= 1) {
-            barrier(CLK_LOCAL_MEM_FENCE);
-            uint other = local_place ^ step;
-            ushort own = keys[local_place], its = keys[other];
-            barrier(CLK_LOCAL_MEM_FENCE);
-            /* The lower of the two places keeps the smaller key where the sequence rises. */
-            bool keeps_smaller = (local_place < other) == ((local_place & size) == 0);
-            keys[local_place] = keeps_smaller ? min(own, its) : max(own, its);
+/* Whether anything blocks a ray, but the simplices that the point is in or a corner of. Each round goes through a node or tests
+   a simplex, so that of rays that go side by side none waits for long. */
+uint blocked(MESH, Point point, float4 direction, float limit, bool doubly) {
+    float4 position = point.position;
+    uint found = OPEN;
+    float4 inverse = inverted(direction);
+    /* What is to be visited: the first of a node's children, and a bit for each; likewise simplices. */
+    uint2 stack[DEPTH], group = (uint2)(0u, 1u), held = (uint2)(0u, 0u);
+    uint depth = 0;
+    for (;;) {
+        if (held.y == 0) {
+            if (group.y == 0) {
+                if (depth == 0) return found;
+                group = stack[--depth];
+            }
+            __global const Node *node = nodes + group.x + LOWEST(group.y);
+            group.y = WITHOUT_LOWEST(group.y);
+            if (group.y != 0) stack[depth++] = group;
+            float8 distances;
+            uint counts = node->counts, inner = counts & 0xffu;
+            uint met_boxes = boxes(node, position, inverse, limit, &distances) & ((1u << (counts >> 8)) - 1u);
+            group = (uint2)(node->children, met_boxes & ((1u << inner) - 1u));
+            if (met_boxes >> inner != 0) held = simplices_of(node, met_boxes & ~((1u << inner) - 1u));
+        }
+        if (held.y != 0) {
+            uint k = held.x + LOWEST(held.y);
+            held.y = WITHOUT_LOWEST(held.y);
+            /* Most that are met from a vertex are those around it. */
+            if (point.vertex != NONE && any(vertices[k] == point.vertex)) continue;
+            float t, t_error;
+            uint one = met(position, direction, FACET_OF(k), CORNERS(k), limit, doubly, &t, &t_error);
+            if (one == OPEN || (point.ignored != NONE && simplices[k] == point.ignored)) continue;
+            if (one == HIT) return HIT;
+            found = UNSURE;
         }
     }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    return get_global_id(0) - local_place + keys[local_place] % GROUP;
 }
-#endif
 
-/* Whether anything blocks each ray of each point: for every ray HIT, OPEN or UNSURE, which the host settles. Rays come from
-   `given`, or where that is not used from the points' sequences. */
+/* Rays come from `given`, or where that is not used from the points' sequences. */
+#define RAYS \
+    __global const Point *points, __global const StarCone *star, __global const uint *matrices, \
+    __global const float4 *given, uint use_given, uint rays
 #define DIRECTION(i) \
-    cleaned(use_given ? given[i] : sampled(points[(i) / rays], points[(i) / rays].next + (uint)((i) % rays), matrices))
+    cleaned(use_given ? given[i] : sampled(points[(i) / rays], points[(i) / rays].next + (i) % rays, matrices))
 
-__kernel void occluded(
-    MESH, uint empty, __global const Point *points, __global const StarCone *star, __global const uint *matrices,
-    __global const float4 *given, uint use_given, uint rays, ulong count, float limit, __global uchar *out) {
-    size_t i = get_global_id(0);
-#ifdef SORTED
-    __local ushort keys[GROUP];
-    i = sorted(i < count ? DIRECTION(i) : (float4)(0.0f), keys);
-#endif
-    if (i >= count) return;
+/* Whether anything blocks each ray of each point: for every ray HIT, OPEN or UNSURE. */
+__kernel void occluded(MESH, uint empty, RAYS, float limit, ulong count, __global uchar *out) {
+    if (get_global_id(0) >= count) return;
+    uint i = (uint)get_global_id(0);
     Point point = points[i / rays];
     float4 direction = DIRECTION(i);
     uint found = hidden_by_star(point, direction, star);
-    if (found == HIT || empty) {
-        out[i] = (uchar)found;
-        return;
-    }
-    float4 inverse = inverted(direction);
-    /* Children that are to be visited: the first of a node's, and a bit for each. */
-    uint2 stack[DEPTH], group = (uint2)(0u, 1u);
-    uint depth = 0;
-    for (;;) {
-        __global const Node *node = nodes + group.x + LOWEST(group.y);
-        group.y = WITHOUT_LOWEST(group.y);
-        if (group.y != 0) stack[depth++] = group;
-        float8 distances;
-        uint met_boxes = boxes(node, point.position, inverse, limit, &distances);
-        uint inner = node->inner;
-        for (uint leaves = met_boxes >> inner; leaves != 0; leaves = WITHOUT_LOWEST(leaves)) {
-            uint2 range = range_of(node, inner + LOWEST(leaves));
-            for (uint k = range.x; k < range.x + range.y; k++) {
-                if (simplices[k] == point.ignored) continue;
-                float t, t_error;
-                uint one = met(point.position, direction, CORNERS(k), limit, &t, &t_error);
-                if (one == HIT) {
-                    out[i] = HIT;
-                    return;
-                }
-                if (one == UNSURE) found = UNSURE;
-            }
-        }
-        group = (uint2)(node->children, met_boxes & ((1u << inner) - 1u));
-        if (group.y == 0) {
-            if (depth == 0) break;
-            group = stack[--depth];
-        }
+    if (found != HIT && !empty) {
+        uint others = blocked(THE_MESH, point, direction, limit, false);
+        found = others == OPEN ? found : others;
     }
     out[i] = (uchar)found;
+}
+
+/* The same for rays that were unsure, in double precision: those whose numbers are in `again`. */
+__kernel void occluded_again(
+    MESH, uint empty, RAYS, float limit, __global const uint *again, ulong count, __global uchar *out) {
+    size_t place = get_global_id(0);
+    if (place >= count) return;
+    uint i = again[place];
+    Point point = points[i / rays];
+    float4 direction = DIRECTION(i);
+    uint found = hidden_by_star(point, direction, star);
+    if (found != HIT && !empty) {
+        uint others = blocked(THE_MESH, point, direction, limit, true);
+        found = others == OPEN ? found : others;
+    }
+    out[place] = (uchar)found;
+}
+
+/* Of 32 rays each, which are open and which unsure: a bit a ray, the first in the lowest. */
+__kernel void packed(__global const uchar *found, ulong count, __global uint *open, __global uint *unsure) {
+    ulong first = 32 * (ulong)get_global_id(0);
+    if (first >= count) return;
+    uint open_bits = 0, unsure_bits = 0;
+    for (uint bit = 0; bit < 32 && first + bit < count; bit++) {
+        open_bits |= (uint)(found[first + bit] == OPEN) << bit;
+        unsure_bits |= (uint)(found[first + bit] == UNSURE) << bit;
+    }
+    open[get_global_id(0)] = open_bits;
+    unsure[get_global_id(0)] = unsure_bits;
 }
 
 /* The simplex that each ray hits first: its number, NONE if there is none, or UNSURE_SIMPLEX. If `bounded`, hits count
@@ -225,14 +301,15 @@ __kernel void first_hit(
         if (entered[depth] > limit * (1.0f + 2e-6f)) continue;
         __global const Node *node = nodes + stack[depth];
         float8 distances;
-        uint met_boxes = boxes(node, position, inverse, limit, &distances);
-        uint inner = node->inner;
-        for (uint leaves = met_boxes >> inner; leaves != 0; leaves = WITHOUT_LOWEST(leaves)) {
-            uint2 range = range_of(node, inner + LOWEST(leaves));
-            for (uint k = range.x; k < range.x + range.y; k++) {
+        uint counts = node->counts, inner = counts & 0xffu;
+        uint met_boxes = boxes(node, position, inverse, limit, &distances) & ((1u << (counts >> 8)) - 1u);
+        if (met_boxes >> inner != 0) {
+            uint2 held = simplices_of(node, met_boxes & ~((1u << inner) - 1u));
+            for (; held.y != 0; held.y = WITHOUT_LOWEST(held.y)) {
+                uint k = held.x + LOWEST(held.y);
                 if (passed != NONE && simplices[k] == passed) continue;
                 float t, t_error;
-                uint one = met(position, direction, CORNERS(k), INFINITY, &t, &t_error);
+                uint one = met(position, direction, FACET_OF(k), CORNERS(k), INFINITY, true, &t, &t_error);
                 if (one == OPEN) continue;
                 if (passed != NONE && one == HIT) {
                     if (t + t_error < bound.x) continue;

@@ -64,9 +64,4 @@ pub trait RayBackend<const D: usize>: Debug + Send + Sync {
         sampling: &Sampling,
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>, Error>;
-
-    /// Whether no ray is traced on this processor, so that it is free for other work.
-    fn is_apart(&self) -> bool {
-        false
-    }
 }

@@ -60,12 +60,10 @@ pub struct Visibility<const D: usize> {
 }
 
 impl<const D: usize> Visibility<D> {
-    /// Chooses the way, and prepares it. A backend apart from the processor casts rays rather than the processor
-    /// scan-converts, unless that was asked for.
+    /// Chooses the way, and prepares it.
     pub fn new(backend: Arc<dyn RayBackend<D>>, camera: &Camera<D>, grid: &Grid, method: Method) -> Self {
         let tracer = backend.tracer();
-        let cast = method == Method::RayCast || method == Method::Auto && backend.is_apart();
-        let raster = (!cast).then(|| Raster::new(tracer.mesh(), camera, grid));
+        let raster = (method != Method::RayCast).then(|| Raster::new(tracer.mesh(), camera, grid));
         let raster = raster.filter(|r| method == Method::Rasterize || r.is_cheaper::<D>(grid, tracer.is_prepared()));
         if raster.is_none() {
             tracer.prepare();

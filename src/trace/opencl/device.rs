@@ -6,13 +6,17 @@
 use std::ffi::c_void;
 use std::marker::PhantomData;
 use std::ptr;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use bytemuck::Pod;
-use opencl3::command_queue::CommandQueue;
+use opencl3::command_queue::{CL_QUEUE_PROFILING_ENABLE, CommandQueue};
 use opencl3::context::Context;
 use opencl3::error_codes::ClError;
+use opencl3::event::Event;
 use opencl3::kernel::Kernel;
-use opencl3::memory::{Buffer, CL_MEM_READ_ONLY, CL_MEM_WRITE_ONLY, ClMem};
+use opencl3::memory::{Buffer, CL_MEM_READ_ONLY, CL_MEM_READ_WRITE, ClMem};
 use opencl3::program::Program;
 use opencl3::types::{CL_TRUE, cl_device_id, cl_mem};
 
@@ -20,21 +24,43 @@ use super::devices::Info;
 use super::error::{Error, explain};
 use super::program::{self, GROUP, Shape};
 
-/// An open device.
+/// An open device, with a queue of its own.
 #[derive(Debug)]
 pub(super) struct Device {
     pub info: Info,
     queue: CommandQueue,
-    context: Context,
+    context: Arc<Context>,
+    /// What has been started since results were read.
+    started: Mutex<Vec<Event>>,
+    /// Nanoseconds that kernels have taken.
+    busy: AtomicU64,
 }
 
 /// The kernels for one dimension and hierarchy.
 #[derive(Debug)]
 pub(super) struct Kernels {
+    program: Arc<Program>,
     pub layout: Kernel,
     pub directions: Kernel,
     pub occluded: Kernel,
+    pub occluded_again: Kernel,
+    pub packed: Kernel,
     pub first_hit: Kernel,
+}
+
+impl Kernels {
+    fn of(program: Arc<Program>) -> Result<Self, (&'static str, ClError)> {
+        let kernel = |name: &'static str| Kernel::create(&program, name).map_err(|error| (name, error));
+        Ok(Self {
+            layout: kernel("layout")?,
+            directions: kernel("directions")?,
+            occluded: kernel("occluded")?,
+            occluded_again: kernel("occluded_again")?,
+            packed: kernel("packed")?,
+            first_hit: kernel("first_hit")?,
+            program,
+        })
+    }
 }
 
 /// Memory of the device that holds values of a type.
@@ -46,12 +72,15 @@ pub(super) struct Memory<T> {
     values: PhantomData<T>,
 }
 
+/// Memory that is used again for as long as it has room.
+pub(super) type Kept<T> = Option<Memory<T>>;
+
 /// What the kernels do with memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     /// They read it.
     Input,
-    /// They write it.
+    /// They write it, and other kernels may read it.
     Output,
 }
 
@@ -77,10 +106,24 @@ impl Device {
             let device = info.label();
             move |error: ClError| Error::Call { device, action, reason: explain(&error) }
         };
-        let context = Context::from_device(&device).map_err(failed("opening the device"))?;
+        let context = Arc::new(Context::from_device(&device).map_err(failed("opening the device"))?);
+        Self::with_queue(info.clone(), context).map_err(failed("making a queue"))
+    }
+
+    /// The same device and memory, with another queue: what is in one does not wait for what is in the other.
+    pub fn beside(&self) -> Result<Self, Error> {
+        Self::with_queue(self.info.clone(), Arc::clone(&self.context)).map_err(self.failed("making a queue"))
+    }
+
+    fn with_queue(info: Info, context: Arc<Context>) -> Result<Self, ClError> {
         #[allow(deprecated)] // The newer call needs OpenCL 2.
-        let queue = CommandQueue::create_default(&context, 0).map_err(failed("making a queue"))?;
-        Ok(Self { info, queue, context })
+        let queue = CommandQueue::create_default(&context, CL_QUEUE_PROFILING_ENABLE)?;
+        Ok(Self { info, queue, context, started: Mutex::default(), busy: AtomicU64::new(0) })
+    }
+
+    /// How long kernels have run, of those whose results were read.
+    pub fn busy(&self) -> Duration {
+        Duration::from_nanos(self.busy.load(Ordering::Relaxed))
     }
 
     fn failed(&self, action: &'static str) -> impl FnOnce(ClError) -> Error + '_ {
@@ -89,11 +132,7 @@ impl Device {
 
     /// Compiles the kernels, and sees that structs are what they should be.
     pub fn build(&self, shape: Shape) -> Result<Kernels, Error> {
-        let kernels = self.compile(&program::text(shape, self.info.double))?;
-        if shape.sorted && self.most_of_group(&kernels.occluded) < GROUP {
-            return self.build(Shape { sorted: false, ..shape });
-        }
-        Ok(kernels)
+        self.compile(&program::text(shape, self.info.double))
     }
 
     fn most_of_group(&self, kernel: &Kernel) -> usize {
@@ -111,15 +150,8 @@ impl Device {
         let refuse = |reason: String| Error::Build { device: self.info.label(), reason, log: log.trim().to_owned() };
         built.map_err(|error| refuse(explain(&error)))?;
         // Some compilers report success and leave kernels out.
-        let kernel = |name: &str| {
-            Kernel::create(&program, name).map_err(|error| refuse(format!("no kernel `{name}`, {}", explain(&error))))
-        };
-        let kernels = Kernels {
-            layout: kernel("layout")?,
-            directions: kernel("directions")?,
-            occluded: kernel("occluded")?,
-            first_hit: kernel("first_hit")?,
-        };
+        let kernels = Kernels::of(Arc::new(program))
+            .map_err(|(name, error)| refuse(format!("no kernel `{name}`, {}", explain(&error))))?;
         let expected = program::expected_layout();
         let sizes = self.output::<u32>(expected.len(), "sizes of structs")?;
         self.launch(&kernels.layout, &[sizes.argument()], 1)?;
@@ -131,6 +163,11 @@ impl Device {
         Ok(kernels)
     }
 
+    /// The same kernels again, as each can have only one set of arguments.
+    pub fn again(&self, kernels: &Kernels) -> Result<Kernels, Error> {
+        Kernels::of(Arc::clone(&kernels.program)).map_err(|(_, error)| self.failed("making a kernel")(error))
+    }
+
     /// Memory for so many results of a kernel, at least one.
     pub fn output<T: Pod>(&self, room: usize, what: &'static str) -> Result<Memory<T>, Error> {
         self.allocate(room, Role::Output, what)
@@ -139,7 +176,41 @@ impl Device {
     /// Memory that holds these values for kernels to read.
     pub fn input<T: Pod>(&self, values: &[T], what: &'static str) -> Result<Memory<T>, Error> {
         let mut memory = self.allocate(values.len(), Role::Input, what)?;
-        self.write(&mut memory, values)?;
+        self.write(&mut memory, 0, values)?;
+        Ok(memory)
+    }
+
+    /// As [`Self::output`], kept.
+    pub fn room<'m, T: Pod>(
+        &self,
+        kept: &'m mut Kept<T>,
+        room: usize,
+        what: &'static str,
+    ) -> Result<&'m Memory<T>, Error> {
+        let found = kept.take().filter(|memory| memory.room >= room);
+        Ok(kept.insert(found.map_or_else(|| self.output(room, what), Ok)?))
+    }
+
+    /// Memory to write so many values to, for kernels to read; what was there may be lost.
+    pub fn room_for_input<'m, T: Pod>(
+        &self,
+        kept: &'m mut Kept<T>,
+        room: usize,
+        what: &'static str,
+    ) -> Result<&'m mut Memory<T>, Error> {
+        let found = kept.take().filter(|memory| memory.room >= room);
+        Ok(kept.insert(found.map_or_else(|| self.allocate(room, Role::Input, what), Ok)?))
+    }
+
+    /// As [`Self::input`], kept.
+    pub fn filled<'m, T: Pod>(
+        &self,
+        kept: &'m mut Kept<T>,
+        values: &[T],
+        what: &'static str,
+    ) -> Result<&'m Memory<T>, Error> {
+        let memory = self.room_for_input(kept, values.len(), what)?;
+        self.write(memory, 0, values)?;
         Ok(memory)
     }
 
@@ -152,7 +223,7 @@ impl Device {
         }
         let flags = match role {
             Role::Input => CL_MEM_READ_ONLY,
-            Role::Output => CL_MEM_WRITE_ONLY,
+            Role::Output => CL_MEM_READ_WRITE,
         };
         // SAFETY: no host memory is handed over.
         let buffer = unsafe { Buffer::<u8>::create(&self.context, flags, bytes, ptr::null_mut::<c_void>()) };
@@ -160,18 +231,19 @@ impl Device {
         Ok(Memory { buffer, room: room.max(1), values: PhantomData })
     }
 
-    /// Writes values to the beginning of the memory.
+    /// Writes values to the memory, from its value number `first` on.
     ///
     /// # Panics
     /// If it has no room for them.
-    fn write<T: Pod>(&self, memory: &mut Memory<T>, values: &[T]) -> Result<(), Error> {
-        assert!(values.len() <= memory.room);
+    pub fn write<T: Pod>(&self, memory: &mut Memory<T>, first: usize, values: &[T]) -> Result<(), Error> {
+        assert!(first + values.len() <= memory.room);
         if values.is_empty() {
             return Ok(());
         }
         let bytes = bytemuck::cast_slice(values);
         // SAFETY: the call waits until the bytes are read, and there is room for them.
-        let done = unsafe { self.queue.enqueue_write_buffer(&mut memory.buffer, CL_TRUE, 0, bytes, &[]) };
+        let offset = first * size_of::<T>();
+        let done = unsafe { self.queue.enqueue_write_buffer(&mut memory.buffer, CL_TRUE, offset, bytes, &[]) };
         done.map(|_| ()).map_err(self.failed("writing to its memory"))
     }
 
@@ -187,7 +259,14 @@ impl Device {
         let bytes = bytemuck::cast_slice_mut(values);
         // SAFETY: the call waits until the bytes are written, and there are as many.
         let done = unsafe { self.queue.enqueue_read_buffer(&memory.buffer, CL_TRUE, 0, bytes, &[]) };
-        done.map(|_| ()).map_err(self.failed("reading from its memory"))
+        done.map_err(self.failed("reading from its memory"))?;
+        // The queue goes in order, so all of it is done.
+        for event in self.started.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+            let time = event.profiling_command_end().ok().zip(event.profiling_command_start().ok());
+            let nanoseconds = time.map_or(0, |(end, start)| end.saturating_sub(start));
+            self.busy.fetch_add(nanoseconds, Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// Starts a kernel with at least so many work-items; what is behind the last has to be seen to by the kernel.
@@ -210,7 +289,9 @@ impl Device {
         let started = unsafe {
             self.queue.enqueue_nd_range_kernel(kernel.get(), 1, ptr::null(), &raw const global, &raw const group, &[])
         };
-        started.map(|_| ()).map_err(self.failed("starting a kernel"))
+        let event = started.map_err(self.failed("starting a kernel"))?;
+        self.started.lock().unwrap_or_else(PoisonError::into_inner).push(event);
+        Ok(())
     }
 }
 
@@ -228,7 +309,7 @@ mod tests {
     #[ignore = "needs an OpenCL device: run tests/all"]
     fn what_the_compiler_says_is_told() {
         let device = open();
-        let shape = Shape { dimension: 4, depth: 20, piece: None, sorted: false };
+        let shape = Shape { dimension: 4, depth: 20, piece: None };
         let text = program::text(shape, device.info.double);
         let broken = device.compile(&text.replace("float4 position;", "flaot4 position;")).unwrap_err().to_string();
         assert!(broken.contains("don't compile") && broken.contains("flaot4"), "{broken}");

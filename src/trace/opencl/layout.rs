@@ -6,10 +6,10 @@ use bytemuck::{Pod, Zeroable};
 
 /// Stands for a simplex that the host has to find.
 pub(super) const UNSURE_SIMPLEX: u32 = u32::MAX - 1;
-/// What is known of a ray: nothing blocks it;
+/// What is known of a ray: nothing blocks it.
 pub(super) const OPEN: u8 = 0;
-/// something does;
-pub(super) const HIT: u8 = 1;
+/// It is not known.
+pub(super) const UNSURE: u8 = 2;
 
 /// A vector of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -27,17 +27,13 @@ pub(super) struct Node {
     pub children: u32,
     /// The first simplex of the leaves.
     pub simplices: u32,
-    /// How many children are nodes.
-    pub inner: u32,
+    /// How many children are nodes, which come first, and how many there are.
+    pub counts: [u8; 4],
+    /// For each axis and child: in how many steps from the origin its box begins, and then, in how many it ends.
+    pub sides: [[[u8; 8]; 2]; 4],
     /// Of a leaf, eight times its first simplex, counted from `simplices`, and how many it has.
     pub leaves: [u8; 8],
-    /// How many children there are.
-    pub filled: u32,
-    pub padding: u32,
-    /// For each axis and child: in how many steps from the origin its box begins,
-    pub low: [[u8; 8]; 4],
-    /// and ends.
-    pub high: [[u8; 8]; 4],
+    pub padding: [u32; 2],
 }
 
 /// A shading point.
@@ -53,7 +49,8 @@ pub(super) struct Point {
     pub star_first: u32,
     pub star_count: u32,
     pub next: u32,
-    pub padding: [u32; 2],
+    pub vertex: u32,
+    pub star_height: f32,
 }
 
 /// A cone that a simplex with a corner at the point hides.
@@ -69,7 +66,7 @@ pub(super) fn sizes() -> Vec<u32> {
     [
         size_of::<Node>(),
         offset_of!(Node, leaves),
-        offset_of!(Node, high),
+        offset_of!(Node, sides),
         size_of::<Point>(),
         offset_of!(Point, keys),
         offset_of!(Point, factor),
@@ -85,6 +82,6 @@ pub(super) fn sizes() -> Vec<u32> {
 mod tests {
     #[test]
     fn layouts_are_those_of_opencl() {
-        assert_eq!(super::sizes(), [112, 32, 80, 80, 32, 48, 68, 80, 64]);
+        assert_eq!(super::sizes(), [112, 96, 32, 80, 32, 48, 68, 80, 64]);
     }
 }

@@ -9,20 +9,24 @@
 //! - [`devices()`]: what there is;
 //! - `device`: an open device, the only file that calls OpenCL;
 //! - `layout`, `program`: the structs and the text of the kernels (`kernels/*.cl`);
-//! - `wide`: the hierarchy as devices want it;
+//! - `wide`, `facet`: the hierarchy and the simplices as devices want them;
+//! - `scene`: the mesh on devices, and who does what of the work;
 //! - [`OpenClBackend`]: a mesh with its hierarchy on devices;
-//! - `points`: shading points, in batches short enough for watchdogs and for whoever wants to stop.
+//! - `points`, `bits`: shading points, in batches short enough for watchdogs and for whoever wants to stop.
 //!
 //! libOpenCL is opened at run time; nothing of it is needed to build, or to run without it.
 
 mod backend;
+mod bits;
 mod device;
 mod devices;
 mod error;
+mod facet;
 mod layout;
 mod open;
 mod points;
 mod program;
+mod scene;
 mod wide;
 
 pub use backend::OpenClBackend;

@@ -13,7 +13,7 @@ pub(super) const PIECES: usize = 4;
 
 /// The kernels of the program.
 #[cfg(test)]
-const KERNELS: [&str; 4] = ["layout", "directions", "occluded", "first_hit"];
+const KERNELS: [&str; 6] = ["layout", "directions", "occluded", "occluded_again", "packed", "first_hit"];
 
 /// Work-items of a group. Always the same, as some compilers make a kernel anew for each number.
 pub(super) const GROUP: usize = 64;
@@ -27,8 +27,6 @@ pub(super) struct Shape {
     pub depth: usize,
     /// The most simplices whose corners are in one piece of memory, if there are several pieces.
     pub piece: Option<usize>,
-    /// Whether the rays of a group are brought into an order of directions.
-    pub sorted: bool,
 }
 
 /// The text for this. In one piece, as some wrappers and drivers can't take more, and without comments, which some compilers
@@ -37,29 +35,19 @@ pub(super) fn text(shape: Shape, double: bool) -> String {
     // By steps, so that what was compiled for one mesh serves most others.
     let (depth, pieces) = (shape.depth.max(1).next_multiple_of(4), if shape.piece.is_some() { PIECES } else { 1 });
     let mut text = format!(
-        "#define D {}\n#define DEPTH {depth}\n#define PIECES {pieces}\n#define PIECE {}u\n#define GROUP {GROUP}\n\
-         #define LOWEST_SQUARED_COSINE {LOWEST_SQUARED_COSINE:e}f\n",
+        "#define D {}\n#define DEPTH {depth}\n#define PIECES {pieces}\n#define PIECE {}u\n\
+         #define LOWEST_SQUARED_COSINE {LOWEST_SQUARED_COSINE:e}f\n#define HALF_ULP {:e}f\n",
         shape.dimension,
         shape.piece.unwrap_or(usize::MAX).min(u32::MAX as usize),
+        f32::EPSILON / 2.0,
     );
-    if shape.sorted {
-        text += "#define SORTED\n";
-    }
     if double {
         text += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n#define DOUBLE\n";
     }
     text += LAYOUT;
     text += SAMPLING;
-    let precision = |real: &str, name: &str, convert: &str, half_ulp: f64| {
-        format!(
-            "#define REAL {real}\n#define REAL4 {real}4\n#define NAME(x) x##_{name}\n#define CONVERT(x) {convert}\n\
-             #define HALF_ULP (({real}){half_ulp:e})\n{CONE}\n#undef REAL\n#undef REAL4\n#undef NAME\n#undef CONVERT\n\
-             #undef HALF_ULP\n#undef HALF_ULPS\n"
-        )
-    };
-    text += &precision("float", "single", "(x)", f64::from(f32::EPSILON) / 2.0);
     if double {
-        text += &precision("double", "double", "convert_double4(x)", f64::EPSILON / 2.0);
+        text += CONE;
     }
     text += TRACE;
     without_comments(&text)
@@ -88,9 +76,9 @@ mod tests {
 
     #[test]
     fn texts_are_plain() {
-        for n in 0..16 {
+        for n in 0..8 {
             let (dimension, double) = (3 + n % 2, n & 2 > 0);
-            let shape = Shape { dimension, depth: 20, piece: (n & 4 > 0).then_some(1000), sorted: n & 8 > 0 };
+            let shape = Shape { dimension, depth: 20, piece: (n & 4 > 0).then_some(1000) };
             let text = text(shape, double);
             assert!(text.is_ascii() && !text.contains("/*") && !text.contains("//") && !text.contains("??/"));
             assert!(!text.contains("\\\n"));

@@ -100,7 +100,7 @@ impl Wide {
                 } else {
                     open.push((*child, wide.nodes.len(), depth + 1));
                     wide.nodes.push(Node::default());
-                    node.inner += 1;
+                    node.counts[0] += 1;
                 }
             }
             wide.nodes[place] = node;
@@ -125,7 +125,7 @@ fn side(origin: f32, exponent: u8, steps: u8) -> f32 {
 /// A node with these boxes, each rounded outwards to the steps of a grid over all of them.
 fn compressed<const D: usize>(boxes: &[Aabb<D>]) -> Node {
     let all = boxes.iter().fold(Aabb::empty(), |all, one| all.union(one));
-    let mut node = Node { filled: boxes.len() as u32, ..Node::default() };
+    let mut node = Node { counts: [0, boxes.len() as u8, 0, 0], ..Node::default() };
     for axis in 0..D {
         let (origin, end) = (all.min[axis], all.max[axis]);
         // The smallest step with which a byte reaches the end.
@@ -145,7 +145,7 @@ fn compressed<const D: usize>(boxes: &[Aabb<D>]) -> Node {
             while high < u8::MAX && side(origin, exponent, high) < one.max[axis] {
                 high += 1;
             }
-            (node.low[axis][lane], node.high[axis][lane]) = (low, high);
+            (node.sides[axis][0][lane], node.sides[axis][1][lane]) = (low, high);
         }
     }
     node
@@ -187,15 +187,16 @@ mod tests {
             let node = &wide.nodes[place];
             reached += 1;
             deepest = deepest.max(above.len());
-            assert!(node.inner <= node.filled && (1..=8).contains(&node.filled));
-            for lane in 0..node.filled as usize {
+            let [inner, filled, ..] = node.counts.map(usize::from);
+            assert!(inner <= filled && (1..=8).contains(&filled));
+            for lane in 0..filled {
                 let at = |axis: usize, steps: u8| side(node.origin.0[axis], node.exponents[axis], steps);
                 let mut above = above.clone();
                 above.push(Aabb {
-                    min: Vector::from_fn(|axis, _| at(axis, node.low[axis][lane])),
-                    max: Vector::from_fn(|axis, _| at(axis, node.high[axis][lane])),
+                    min: Vector::from_fn(|axis, _| at(axis, node.sides[axis][0][lane])),
+                    max: Vector::from_fn(|axis, _| at(axis, node.sides[axis][1][lane])),
                 });
-                if lane < node.inner as usize {
+                if lane < inner {
                     open.push((node.children as usize + lane, above));
                     continue;
                 }
