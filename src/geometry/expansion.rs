@@ -4,7 +4,8 @@
 //! Exact as long as nothing overflows or underflows. For polynomials of degree 4 in differences of `f32` that can't
 //! happen: the smallest bit is 2^(-149 * 4), the largest value below 2^(129 * 4 + 5).
 
-/// An exact number: components of increasing magnitude that do not overlap; the empty list is zero.
+/// An exact number: components of increasing magnitude that do not overlap, and strongly so in Shewchuk's sense: no two neighbours
+/// are adjacent unless both are powers of two. The empty list is zero.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Expansion(Vec<f64>);
 
@@ -50,21 +51,34 @@ impl Expansion {
         }
     }
 
-    fn add_component(&self, b: f64) -> Self {
-        let mut result = Self(Vec::with_capacity(self.0.len() + 1));
-        let mut carry = b;
-        for &component in &self.0 {
+    /// The exact sum: all components merged by magnitude, and summed from the least on (Shewchuk's *fast expansion sum*, which keeps
+    /// them strongly nonoverlapping).
+    pub fn add(&self, other: &Self) -> Self {
+        let (mut left, mut right) = (self.0.as_slice(), other.0.as_slice());
+        let mut result = Self(Vec::with_capacity(left.len() + right.len()));
+        let mut carry = 0.0;
+        loop {
+            let component = match (left, right) {
+                ([a, rest @ ..], [b, ..]) if a.abs() < b.abs() => {
+                    left = rest;
+                    *a
+                }
+                (_, [b, rest @ ..]) => {
+                    right = rest;
+                    *b
+                }
+                ([a, rest @ ..], []) => {
+                    left = rest;
+                    *a
+                }
+                ([], []) => break,
+            };
             let (sum, error) = two_sum(carry, component);
             result.push(error);
             carry = sum;
         }
         result.push(carry);
         result
-    }
-
-    /// The exact sum.
-    pub fn add(&self, other: &Self) -> Self {
-        other.0.iter().fold(self.clone(), |sum, &component| sum.add_component(component))
     }
 
     /// The exact negative.
@@ -89,7 +103,8 @@ impl Expansion {
 
     /// The exact product.
     pub fn multiply(&self, other: &Self) -> Self {
-        other.0.iter().fold(Self::default(), |sum, &component| sum.add(&self.scale(component)))
+        let (short, long) = if self.0.len() < other.0.len() { (self, other) } else { (other, self) };
+        short.0.iter().fold(Self::default(), |sum, &component| sum.add(&long.scale(component)))
     }
 
     /// -1, 0 or 1: the largest component decides, as the others can't reach it.
@@ -109,7 +124,67 @@ impl Expansion {
 
 #[cfg(test)]
 mod tests {
+    use num_bigint::BigInt;
+
     use super::*;
+
+    /// In units of 2^-1200.
+    fn whole(x: f64) -> BigInt {
+        let bits = x.to_bits();
+        let (exponent, digits) = ((bits >> 52 & 0x7ff) as i64, bits & ((1 << 52) - 1));
+        let digits = BigInt::from(if exponent == 0 { digits } else { digits | 1 << 52 });
+        let size = digits << (exponent.max(1) - 1075 + 1200);
+        if x < 0.0 { -size } else { size }
+    }
+
+    fn of(e: &Expansion) -> BigInt {
+        e.0.iter().map(|&x| whole(x)).sum()
+    }
+
+    /// Whether each component is below the lowest bit of the next.
+    fn overlaps(e: &Expansion) -> bool {
+        e.0.windows(2).any(|pair| {
+            let lowest = whole(pair[1]).trailing_zeros().unwrap_or(0);
+            whole(pair[0]).magnitude().bits() > lowest
+        })
+    }
+
+    #[test]
+    fn sums_and_products_are_exact_and_do_not_overlap() {
+        let mut state = 11u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state >> 33
+        };
+        let mut number = |k: u64| {
+            // Of many sizes, of few digits, powers of two, and zero.
+            let digits = match k % 4 {
+                0 => (random() % 9) as f64 - 4.0,
+                1 => 2f64.powi((random() % 24) as i32),
+                _ => random() as f64 - 1e9,
+            };
+            f64::from((digits * 2f64.powi((random() % 60) as i32 - 40)) as f32)
+        };
+        let unit = BigInt::from(1) << 1200;
+        for k in 0..3000 {
+            let all: Vec<f64> = (0..6).map(|i| number(k + i)).collect();
+            let pair = |i: usize| Expansion::difference(all[i], all[i + 1]);
+            let [a, b, c] = [0, 2, 4].map(pair);
+            let (ab, sum) = (a.multiply(&b), a.add(&c));
+            let abc = ab.add(&sum).multiply(&c).add(&a.multiply(&sum).negate());
+            assert_eq!(of(&ab) * &unit, of(&a) * of(&b));
+            assert_eq!(of(&sum), of(&a) + of(&c));
+            assert_eq!(
+                of(&abc) * &unit * &unit,
+                (of(&a) * of(&b) + of(&sum) * &unit) * of(&c) - of(&a) * of(&sum) * &unit
+            );
+            for e in [&a, &ab, &sum, &abc] {
+                assert!(!overlaps(e), "{e:?}");
+                assert_eq!(e.sign(), if of(e) == BigInt::ZERO { 0 } else { 2 * i32::from(of(e) > BigInt::ZERO) - 1 });
+            }
+            assert_eq!(abc.add(&abc.negate()), Expansion::default());
+        }
+    }
 
     #[test]
     fn keeps_what_doubles_lose() {

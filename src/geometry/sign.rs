@@ -29,21 +29,23 @@ impl<const D: usize> Column<D> {
     }
 }
 
-/// The exact determinant of the square matrix of these rows, by Laplace expansion along the first one.
+/// The exact determinant of the square matrix of these columns of the rows: minors of the last rows by Laplace expansion, each made
+/// once and used for all those of one row more.
 fn laplace(rows: &[Vec<Expansion>], columns: &[usize]) -> Expansion {
-    let Some((first, rest)) = rows.split_first() else {
-        return Expansion::difference(1.0, 0.0);
-    };
-    let mut sum = Expansion::default();
-    for (k, &column) in columns.iter().enumerate() {
-        if first[column].sign() == 0 {
-            continue;
+    let count = columns.len();
+    // For each set of columns, a bit each, the minor of as many rows, the last ones.
+    let mut minors = vec![Expansion::difference(1.0, 0.0)];
+    for set in 1usize..1 << count {
+        let row = &rows[count - set.count_ones() as usize];
+        let mut minor = Expansion::default();
+        let members = (0..count).filter(|column| set >> column & 1 == 1);
+        for (k, column) in members.enumerate() {
+            let term = row[columns[column]].multiply(&minors[set & !(1 << column)]);
+            minor = minor.add(&if k % 2 == 0 { term } else { term.negate() });
         }
-        let others: Vec<usize> = columns.iter().copied().filter(|&c| c != column).collect();
-        let term = first[column].multiply(&laplace(rest, &others));
-        sum = sum.add(&if k % 2 == 0 { term } else { term.negate() });
+        minors.push(minor);
     }
-    sum
+    minors.pop().unwrap_or_default()
 }
 
 /// The determinant of the D columns, exactly.
