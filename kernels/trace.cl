@@ -222,38 +222,29 @@ uint blocked(MESH, Point point, float4 direction, float limit, bool doubly) {
 /* Rays come from `given`, or where that is not used from the points' sequences. */
 #define RAYS \
     __global const Point *points, __global const StarCone *star, __global const uint *matrices, \
-    __global const float4 *given, uint use_given, uint rays
-#define DIRECTION(i) \
-    cleaned(use_given ? given[i] : sampled(points[(i) / rays], points[(i) / rays].next + (i) % rays, matrices))
+    __global const float4 *given, uint use_given, uint rays, float limit
+#define THE_RAYS points, star, matrices, given, use_given, rays, limit
 
-/* Whether anything blocks each ray of each point: for every ray HIT, OPEN or UNSURE. */
-__kernel void occluded(MESH, uint empty, RAYS, float limit, ulong count, __global uchar *out) {
-    if (get_global_id(0) >= count) return;
-    uint i = (uint)get_global_id(0);
+/* Whether anything blocks ray number i of all points' rays: HIT, OPEN or UNSURE. */
+uint becomes(MESH, uint empty, RAYS, uint i, bool doubly) {
     Point point = points[i / rays];
-    float4 direction = DIRECTION(i);
+    float4 direction = cleaned(use_given ? given[i] : sampled(point, point.next + i % rays, matrices));
     uint found = hidden_by_star(point, direction, star);
-    if (found != HIT && !empty) {
-        uint others = blocked(THE_MESH, point, direction, limit, false);
-        found = others == OPEN ? found : others;
-    }
-    out[i] = (uchar)found;
+    if (found == HIT || empty) return found;
+    uint others = blocked(THE_MESH, point, direction, limit, doubly);
+    return others == OPEN ? found : others;
+}
+
+/* What becomes of each ray. */
+__kernel void occluded(MESH, uint empty, RAYS, ulong count, __global uchar *out) {
+    size_t i = get_global_id(0);
+    if (i < count) out[i] = (uchar)becomes(THE_MESH, empty, THE_RAYS, (uint)i, false);
 }
 
 /* The same for rays that were unsure, in double precision: those whose numbers are in `again`. */
-__kernel void occluded_again(
-    MESH, uint empty, RAYS, float limit, __global const uint *again, ulong count, __global uchar *out) {
+__kernel void occluded_again(MESH, uint empty, RAYS, __global const uint *again, ulong count, __global uchar *out) {
     size_t place = get_global_id(0);
-    if (place >= count) return;
-    uint i = again[place];
-    Point point = points[i / rays];
-    float4 direction = DIRECTION(i);
-    uint found = hidden_by_star(point, direction, star);
-    if (found != HIT && !empty) {
-        uint others = blocked(THE_MESH, point, direction, limit, true);
-        found = others == OPEN ? found : others;
-    }
-    out[place] = (uchar)found;
+    if (place < count) out[place] = (uchar)becomes(THE_MESH, empty, THE_RAYS, again[place], true);
 }
 
 /* Of 32 rays each, which are open and which unsure: a bit a ray, the first in the lowest. */
