@@ -86,9 +86,9 @@ float4 inverted(float4 direction) {
     return 1.0f / copysign(max(size, 1e-20f), direction);
 }
 
-/* Which of a node's boxes the ray enters before `limit`, a bit each, and distances before which it doesn't. Boxes are a little
-   larger than what they hold, and distances are taken wider than they are by more than any rounding: no box is missed that
-   holds a hit. Beside the products and sums here, whose rounding is below 1e-6 of `slack`'s factor, the reciprocals are rounded. */
+/* Which of a node's boxes the ray enters before `limit`, a bit each, and distances before which it doesn't. No box is missed that
+   holds a hit: boxes are an ulp larger than what they hold; `slack` is more than the rounding of the difference, the products
+   and the sum of a side, eight half-ulps of its terms; and the comparison allows for that of the reciprocals. */
 uint boxes(__global const Node *node, float4 position, float4 inverse, float limit, float8 *distances) {
     float8 enter = (float8)(0.0f), leave = (float8)(limit);
     float4 origin = node->origin;

@@ -39,7 +39,7 @@ pub(super) struct Tuning {
 /// The mesh on the devices.
 #[derive(Debug)]
 pub(super) struct Scene {
-    /// What works side by side: two parts of each device, as one prepares its rays while the other's are traced.
+    /// What works side by side: two parts of each device but of processors, as one prepares its rays while the other's are traced.
     pub parts: Vec<Part>,
     /// Whether scaled coordinates lose nothing. If they do, the device isn't asked.
     pub serves: bool,

@@ -5,8 +5,9 @@
 //! deep (after Ylitie, Karras and Laine, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, HPG 2017). All
 //! eight boxes are one vector of eight numbers, which a processor with AVX has registers for.
 //!
-//! A box is rounded outwards to steps of the node's own grid. The device finds its sides by one exact product and one sum that
-//! is correctly rounded, as here; so that they hold what they should is seen when they are made.
+//! A box is rounded outwards to steps of the node's own grid: what `side` makes of them, one exact product and one rounded
+//! sum, holds what it should, with an ulp to spare on each side (`grown`). That is more than the sum's rounding, so the box of the
+//! unrounded sides holds it too, and the device, which makes distances from them in another order, allows for its own rounding.
 
 use super::layout::Node;
 use crate::accel::{Bvh, Scale};
@@ -117,7 +118,7 @@ fn grown<const D: usize>(bounds: &Aabb<D>, scale: &Scale<D>) -> Aabb<D> {
     }
 }
 
-/// A side of a box: what the device makes of so many steps from the origin.
+/// A side of a box, so many steps from the origin; rounded to nearest.
 fn side(origin: f32, exponent: u8, steps: u8) -> f32 {
     origin + f32::from(steps) * f32::from_bits(u32::from(exponent) << 23)
 }
