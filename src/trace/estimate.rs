@@ -85,16 +85,23 @@ impl Accumulator {
 
     /// The next `count` rays; the lowest bits of `open` tell which of them escape.
     pub fn add(&mut self, mut open: u64, mut count: u32) {
-        if self.rays() == 0 && count == u64::BITS {
-            // What the loop below would come to: a group for each byte.
-            self.groups = Groups::of(u64::BITS / LEAST as u32, open.to_le_bytes().map(u8::count_ones));
-            return;
-        }
         while count > 0 {
             let taken = count.min(self.groups.room()).min(u64::BITS);
             self.groups.add(taken, (open & (u64::MAX >> (u64::BITS - taken))).count_ones());
             count -= taken;
             open = open.checked_shr(taken).unwrap_or(0);
+        }
+    }
+
+    /// The next rays, as many as there were or a part of that, in [`LEAST`] runs of equal size: how many of each escape.
+    pub fn add_runs(&mut self, size: u32, escaped: [u32; LEAST]) {
+        if self.rays() == 0 {
+            self.groups = Groups::of(size, escaped);
+            return;
+        }
+        for count in escaped {
+            debug_assert!(size <= self.groups.room(), "runs of {size} rays in groups of {}", self.groups.size());
+            self.groups.add(size, count);
         }
     }
 

@@ -109,6 +109,11 @@ impl Sequence {
         }
     }
 
+    /// Leaves out the next `count` Sobol' points.
+    pub(crate) fn skip(&mut self, count: u32) {
+        self.next = self.next.wrapping_add(count);
+    }
+
     /// The next point, each coordinate in (-1, 1) on a grid of 2^24.
     #[inline]
     pub fn next_point<const N: usize>(&mut self) -> [f32; N] {

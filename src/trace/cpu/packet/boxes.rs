@@ -11,7 +11,7 @@ use super::view::HEIGHT_ROUNDING;
 use crate::accel::{WIDTH, WideNode};
 
 /// At least so many rays are tested box by box.
-const MANY: u32 = 24;
+const MANY: u32 = 40;
 /// Ahead of the origin: no ray meets what ends there. Not even the nearest hit is nearer.
 pub(super) const AHEAD: f32 = f32::from_bits(1);
 /// What near and far sides of boxes are pulled apart by, in proportion, where axes are compared.
@@ -93,6 +93,10 @@ impl<L: Lanes, const D: usize> Boxes<L, D> {
             sets[child] = if around >> child & 1 == 1 { set } else { 0 };
         }
         let mut open = !(around | below | unused);
+        let mut groups = 0u32;
+        for group in 0..BLOCK / WIDTH {
+            groups |= u32::from(set >> (group * WIDTH) & 0xff != 0) << group;
+        }
         while open != 0 {
             let child = open.trailing_zeros() as usize % WIDTH;
             open &= open - 1;
@@ -101,7 +105,10 @@ impl<L: Lanes, const D: usize> Boxes<L, D> {
                 (middle[k], half[k]) = (L::splat(rows[k][0][child]), L::splat(rows[k][1][child]));
             }
             let mut met = 0;
-            for group in 0..BLOCK / WIDTH {
+            let mut left = groups;
+            while left != 0 {
+                let group = left.trailing_zeros() as usize % WIDTH;
+                left &= left - 1;
                 let (mut enter, mut exit) = (L::splat(AHEAD), limit);
                 for k in 0..D {
                     let absolute = L::load(&rays.absolute[k].as_chunks().0[group]);

@@ -1,10 +1,12 @@
 //! The rays of one shading point, 64 at a time.
 //!
 //! These are the directions of [`Sequence::next_direction`], bit for bit: the same operations in the same order, without
-//! branches, so that the compiler works on several directions at once. A nested scrambling keeps an aligned block of 64 indices together, so the block's indices can be
-//! taken in ascending order, which a count does not notice, and their Sobol' points are those of 0 to 63, from a table, with one constant added.
+//! branches, so that the compiler works on several directions at once. A nested scrambling keeps an aligned run of 2^n indices together, and their
+//! Sobol' points are the first 2^n, from a table, with one constant added. So those of one or several blocks can be taken in
+//! another order ([`super::nets`]).
 
 use super::lanes::Lanes;
+use super::nets::Net;
 use crate::accel::WIDTH;
 use crate::geometry::{Dimension, Frame, Vector};
 use crate::trace::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, scramble_reversed, sobol};
@@ -54,7 +56,7 @@ impl<const D: usize> Rays<D> {
         }
     }
 
-    /// Takes the next `count` directions of the sequence; it must have given whole blocks so far.
+    /// Takes the next `count` directions of the sequence, which must have given whole blocks so far.
     #[inline(always)]
     pub fn take(&mut self, sequence: &mut Sequence, frame: &Frame<D>, count: usize) {
         let mut points = [[0.0f32; BLOCK]; 3];
@@ -75,20 +77,28 @@ impl<const D: usize> Rays<D> {
                 let base = scramble(sequence.next, keys[3]) & !(BLOCK as u32 - 1);
                 for d in 0..D - 1 {
                     let constant = sobol(base, d).reverse_bits();
-                    if count == BLOCK {
-                        for i in 0..BLOCK {
-                            let bits = scramble_reversed(SOBOL_BLOCK[d][i] ^ constant, keys[d]).reverse_bits();
-                            points[d][i] = unit(bits);
-                        }
-                    } else {
-                        for i in 0..count {
-                            let place = scramble(sequence.next.wrapping_add(i as u32), keys[3]) as usize % BLOCK;
-                            let bits = scramble_reversed(SOBOL_BLOCK[d][place] ^ constant, keys[d]).reverse_bits();
-                            points[d][i] = unit(bits);
-                        }
+                    for i in 0..count {
+                        let place = scramble(sequence.next.wrapping_add(i as u32), keys[3]) as usize % BLOCK;
+                        let bits = scramble_reversed(SOBOL_BLOCK[d][place] ^ constant, keys[d]).reverse_bits();
+                        points[d][i] = unit(bits);
                     }
                 }
                 sequence.next = sequence.next.wrapping_add(count as u32);
+            }
+        }
+        self.lift(&points, frame);
+    }
+
+    /// Takes those of the next directions of Sobol' points that a block of the net has. The sequence stays where it is.
+    #[inline(always)]
+    pub fn take_of(&mut self, net: &Net, block: usize, sequence: &Sequence, frame: &Frame<D>) {
+        let Source::Sobol(keys) = &sequence.source else { unreachable!("random points are no nets") };
+        let mut points = [[0.0f32; BLOCK]; 3];
+        let base = scramble(sequence.next, keys[3]) & !(net.rays() as u32 - 1);
+        for d in 0..D - 1 {
+            let constant = sobol(base, d).reverse_bits();
+            for i in 0..BLOCK {
+                points[d][i] = unit(scramble_reversed(net.points(block)[d][i] ^ constant, keys[d]).reverse_bits());
             }
         }
         self.lift(&points, frame);

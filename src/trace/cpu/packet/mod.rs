@@ -7,6 +7,7 @@
 //! - [`level`]: the instructions that a processor may have;
 //! - [`lanes`], `x86`: eight numbers side by side, for each level;
 //! - [`directions`]: the rays of a shading point, 64 at a time;
+//! - [`nets`]: which of the rays share a block;
 //! - [`star`]: what the simplices around a vertex hide;
 //! - [`traverse`]: the rays through the [`crate::accel::WideBvh`];
 //! - [`boxes`]: sets of rays against the boxes of a node;
@@ -22,6 +23,7 @@ mod directions;
 mod lanes;
 mod leaves;
 mod level;
+mod nets;
 mod query;
 mod single;
 mod star;

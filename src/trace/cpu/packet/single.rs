@@ -25,7 +25,7 @@ pub(super) fn judge_one<L: Lanes, const D: usize>(
     leaf: &Leaf<D>,
     i: usize,
 ) -> [u8; 2] {
-    let view = View::new(query, leaf);
+    let view = if D == 3 { View::rough(leaf) } else { View::new(query, leaf) };
     match Dimension::of::<D>() {
         Dimension::Three => in_three::<L, D>(query, rays, leaf, view.bounds::<D>(ONE_ROUNDING[0]), i),
         Dimension::Four => in_four::<L, D>(query, rays, leaf, view.bounds::<D>(ONE_ROUNDING[1]), i),

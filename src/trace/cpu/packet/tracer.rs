@@ -5,6 +5,7 @@ use super::lanes::{Lanes, Portable};
 use super::level::Level;
 #[cfg(target_arch = "x86_64")]
 use super::level::{with_avx2, with_avx512};
+use super::nets::Net;
 use super::query::Query;
 use super::star::VertexStar;
 use super::traverse::Traversal;
@@ -16,6 +17,7 @@ use crate::mesh::approach;
 use crate::progress::{Cancelled, Progress, Silent};
 use crate::trace::cpu::scalar::{estimate_at, watched_at};
 use crate::trace::estimate::{Accumulator, Estimate, Watch};
+use crate::trace::groups::LEAST;
 use crate::trace::sampling::LOWEST_SQUARED_COSINE;
 use crate::trace::{Sampler, Sampling, Sequence, ShadingPoint, Target};
 
@@ -191,6 +193,18 @@ impl<const D: usize> PacketTracer<D> {
     }
 }
 
+impl<const D: usize> PacketTracer<D> {
+    /// Which of the rays `alive` escape.
+    #[inline(always)]
+    fn open<L: Lanes>(&mut self, query: &Query<D>, around: &[u32], alive: u64) -> u64 {
+        self.rays.complete();
+        let hidden = self.star.hidden::<L>(query, &self.rays, around, alive);
+        let hit = self.traversal.blocked::<L>(query, &self.rays, alive & !hidden);
+        let open = alive & !(hidden | hit);
+        if query.wide.far.nodes.is_empty() { open } else { open & !query.hits_far(&self.rays, open) }
+    }
+}
+
 /// [`traced`] compiled for AVX2.
 #[cfg(target_arch = "x86_64")]
 macro_rules! compiled_for_avx2 {
@@ -233,35 +247,54 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
             &[]
         }
     };
-    let (total, sampler) = match &source {
-        Source::Sequence { samples, sequence, .. } => (*samples as usize, sequence.sampler()),
-        Source::Directions(directions) => (directions.len(), Sampler::Random),
+    let (total, sampler, target) = match &source {
+        Source::Sequence { samples, sequence, target, .. } => (*samples as usize, sequence.sampler(), *target),
+        Source::Directions(directions) => (directions.len(), Sampler::Random, None),
     };
     let mut accumulator = Accumulator::new(sampler, Dimension::of::<D>());
-    for (block, first) in (0..total).step_by(BLOCK).enumerate() {
-        if block % BLOCKS_BETWEEN_LOOKS == 0 && progress.cancelled() {
-            return Err(Cancelled);
+    let (mut first, mut blocks) = (0, 0);
+    while first < total {
+        if blocks >= BLOCKS_BETWEEN_LOOKS || first == 0 {
+            blocks = 0;
+            if progress.cancelled() {
+                return Err(Cancelled);
+            }
         }
-        let count = BLOCK.min(total - first);
-        match &mut source {
-            Source::Sequence { sequence, frame, .. } => packets.rays.take(sequence, frame, count),
-            Source::Directions(directions) => packets.rays.set(&directions[first..first + count], &query.normal),
+        let net = if sampler == Sampler::Sobol && watch.is_none() {
+            // To where the target is looked at next.
+            let end = if target.is_some() { (first + 1).next_power_of_two().max(Target::FEWEST as usize) } else { total };
+            Net::after(first, end.min(total) - first, Dimension::of::<D>())
+        } else {
+            None
+        };
+        match (net, &mut source) {
+            (Some(net), Source::Sequence { sequence, frame, .. }) => {
+                let mut escaped = [0; LEAST];
+                for block in 0..net.blocks() {
+                    packets.rays.take_of(net, block, sequence, frame);
+                    net.count(block, packets.open::<L>(query, around, u64::MAX), &mut escaped);
+                }
+                sequence.skip(net.rays() as u32);
+                accumulator.add_runs((net.rays() / LEAST) as u32, escaped);
+                (first, blocks) = (first + net.rays(), blocks + net.blocks());
+            }
+            (_, source) => {
+                let count = BLOCK.min(total - first);
+                match source {
+                    Source::Sequence { sequence, frame, .. } => packets.rays.take(sequence, frame, count),
+                    Source::Directions(directions) => {
+                        packets.rays.set(&directions[first..first + count], &query.normal);
+                    }
+                }
+                let open = packets.open::<L>(query, around, u64::MAX >> (BLOCK - count));
+                if let Some(watch) = &mut watch {
+                    packets.rays.tell(open, count, watch);
+                }
+                accumulator.add(open, count as u32);
+                (first, blocks) = (first + count, blocks + 1);
+            }
         }
-        packets.rays.complete();
-        let alive = u64::MAX >> (BLOCK - count);
-        let hidden = packets.star.hidden::<L>(query, &packets.rays, around, alive);
-        let hit = packets.traversal.blocked::<L>(query, &packets.rays, alive & !hidden);
-        let mut open = alive & !(hidden | hit);
-        if !query.wide.far.nodes.is_empty() {
-            open &= !query.hits_far(&packets.rays, open);
-        }
-        if let Some(watch) = &mut watch {
-            packets.rays.tell(open, count, watch);
-        }
-        accumulator.add(open, count as u32);
-        if let Source::Sequence { target: Some(target), .. } = &source
-            && target.is_met(&accumulator)
-        {
+        if target.is_some_and(|target| target.is_met(&accumulator)) {
             break;
         }
     }

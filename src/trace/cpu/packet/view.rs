@@ -36,6 +36,12 @@ impl View {
         Self { size: (leaf.reach() + sum) * (1.0 + 1e-5), edge: leaf.edge(), distance }
     }
 
+    /// The same for any origin that the hierarchy serves: within 1 of the middle of the scene, which is 1 wide.
+    #[inline(always)]
+    pub fn rough<const D: usize>(leaf: &Leaf<D>) -> Self {
+        Self { size: 1.5 * D as f32 * (1.0 + 1e-4), edge: leaf.edge(), distance: 0.0 }
+    }
+
     /// Bounds on the rounding of a facet value and of a determinant, given that of their parts in half-ulps.
     #[inline(always)]
     pub fn bounds<const D: usize>(&self, half_ulps: f32) -> [f32; 2] {
