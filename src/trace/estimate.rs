@@ -85,6 +85,10 @@ impl Accumulator {
 
     /// The next `count` rays; the lowest bits of `open` tell which of them escape.
     pub fn add(&mut self, mut open: u64, mut count: u32) {
+        if count == u64::BITS && self.rays() == 0 {
+            // What the loop below would come to: a run for each byte.
+            return self.add_runs(u64::BITS / LEAST as u32, open.to_le_bytes().map(u8::count_ones));
+        }
         while count > 0 {
             let taken = count.min(self.groups.room()).min(u64::BITS);
             self.groups.add(taken, (open & (u64::MAX >> (u64::BITS - taken))).count_ones());

@@ -172,6 +172,19 @@ impl<const D: usize> Rays<D> {
         }
     }
 
+    /// The lowest cosine of the first `count` rays to the normal.
+    #[inline(always)]
+    pub fn lowest<L: Lanes>(&self, count: usize) -> f32 {
+        let (rows, rest) = self.height[..count].as_chunks::<WIDTH>();
+        let mut lowest = L::splat(f32::INFINITY);
+        for row in rows {
+            lowest = lowest.min(L::load(row));
+        }
+        let mut last = [f32::INFINITY; WIDTH];
+        lowest.store(&mut last);
+        last.into_iter().chain(rest.iter().copied()).fold(f32::INFINITY, |a, b| if b < a { b } else { a })
+    }
+
     /// The rays whose cosine to the normal is at most this.
     #[inline(always)]
     pub fn up_to_height<L: Lanes>(&self, height: f32) -> u64 {

@@ -165,10 +165,6 @@ impl<const D: usize> PacketTracer<D> {
             let rays = directions.iter().map(|d| Ray::new(*origin, *d));
             return rays.filter(|ray| tracer.occluded(ray, limit, ignored)).count() as u32;
         }
-        // Left out only if all rays surely are on its side.
-        let lowest = directions.iter().map(|d| d.dot(&normal)).fold(f32::INFINITY, |a, b| if b < a { b } else { a });
-        let on_side = lowest > 1e-5;
-        let normal = if on_side { normal } else { Vector::zeros() };
         let query = Query::new(tracer, *origin, (normal, 0.0), limit, ignored.as_slice(), None);
         let source = Source::Directions(directions);
         // Nobody cancels.
@@ -235,11 +231,11 @@ with_avx512!(compiled_for_avx512);
 /// Counts the rays that escape.
 #[inline(always)]
 fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
-    let Job { query, vertex, mut source, mut watch, progress } = job;
-    let query = &query;
+    let Job { mut query, vertex, mut source, mut watch, progress } = job;
+    let side = query.normal;
     let around = match &vertex {
         Some(at) => {
-            packets.star.set::<L>(query, at.ways, at.identity, at.around);
+            packets.star.set::<L>(&query, at.ways, at.identity, at.around);
             at.around
         }
         None => {
@@ -272,7 +268,7 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
                 let mut escaped = [0; LEAST];
                 for block in 0..net.blocks() {
                     packets.rays.take_of(net, block, sequence, frame);
-                    net.count(block, packets.open::<L>(query, around, u64::MAX), &mut escaped);
+                    net.count(block, packets.open::<L>(&query, around, u64::MAX), &mut escaped);
                 }
                 sequence.skip(net.rays() as u32);
                 accumulator.add_runs((net.rays() / LEAST) as u32, escaped);
@@ -283,10 +279,13 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
                 match source {
                     Source::Sequence { sequence, frame, .. } => packets.rays.take(sequence, frame, count),
                     Source::Directions(directions) => {
-                        packets.rays.set(&directions[first..first + count], &query.normal);
+                        packets.rays.set(&directions[first..first + count], &side);
+                        // Left out only if all rays surely are on its side.
+                        let on_side = packets.rays.lowest::<L>(count) > 1e-5;
+                        query.normal = if on_side { side } else { Vector::zeros() };
                     }
                 }
-                let open = packets.open::<L>(query, around, u64::MAX >> (BLOCK - count));
+                let open = packets.open::<L>(&query, around, u64::MAX >> (BLOCK - count));
                 if let Some(watch) = &mut watch {
                     packets.rays.tell(open, count, watch);
                 }
