@@ -64,8 +64,8 @@ impl<const D: usize> Bin<D> {
     }
 
     #[inline(always)]
-    fn cost(&self) -> f32 {
-        if self.count == 0 { 0.0 } else { self.bounds.half_surface() * self.count as f32 }
+    fn cost(&self, block: u32) -> f32 {
+        if self.count == 0 { 0.0 } else { self.bounds.half_surface() * (self.count.div_ceil(block) * block) as f32 }
     }
 }
 
@@ -235,6 +235,7 @@ impl<const D: usize> Binning<D> {
     /// The cheapest of all splits between bins, over all axes; none if all centres coincide.
     fn best_split(&self, bins: &Bins<D>, items: usize) -> Option<Split<D>> {
         let mut best: Option<Split<D>> = None;
+        let block = if (9..=64).contains(&items) { 8 } else { 1 };
         for (axis, bins) in bins.iter().enumerate().filter(|(axis, _)| self.factor[*axis] > 0.0) {
             let mut rights = [Bin::empty(); BINS];
             let mut right = Bin::empty();
@@ -245,7 +246,7 @@ impl<const D: usize> Binning<D> {
             let mut left = Bin::empty();
             for bin in 0..self.count - 1 {
                 left.join(&bins[bin]);
-                let cost = left.cost() + rights[bin + 1].cost();
+                let cost = left.cost(block) + rights[bin + 1].cost(block);
                 if left.count > 0 && (left.count as usize) < items && best.is_none_or(|b| cost < b.cost) {
                     best = Some(Split { axis, bin, cost, sides: [left.bounds, rights[bin + 1].bounds] });
                 }
