@@ -62,6 +62,11 @@ impl Estimate {
 }
 
 impl Target {
+    /// How many rays there are when the error is looked at next, after so many.
+    pub(crate) fn next_look(rays: usize) -> usize {
+        (rays + 1).next_power_of_two().max(Self::FEWEST as usize)
+    }
+
     /// Whether the rays so far are enough.
     pub(crate) fn is_met(&self, accumulator: &Accumulator) -> bool {
         let rays = accumulator.rays();
@@ -97,7 +102,7 @@ impl Accumulator {
         }
     }
 
-    /// The next rays, as many as there were or a part of that, in [`LEAST`] runs of equal size: how many of each escape.
+    /// The next rays, in [`LEAST`] runs of equal size, which is a power of two that divides the size of groups: how many of each escape.
     pub fn add_runs(&mut self, size: u32, escaped: [u32; LEAST]) {
         if self.rays() == 0 {
             self.groups = Groups::of(size, escaped);

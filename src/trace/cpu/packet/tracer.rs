@@ -94,8 +94,8 @@ impl<const D: usize> PacketTracer<D> {
         self.at(tracer, point, sampling, None, progress)
     }
 
-    /// The same, and tells each ray to `watch`: block by block of 64, the rays of a block in an order that keeps aligned
-    /// runs of 2^k of them together. Objects that let light through count as opaque.
+    /// The same, and tells each ray to `watch`, in the order of the [`Sequence`]. Objects that let light through count as
+    /// opaque.
     ///
     /// # Errors
     /// [`Cancelled`] if `progress` says so.
@@ -248,53 +248,48 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
         Source::Directions(directions) => (directions.len(), Sampler::Random, None),
     };
     let mut accumulator = Accumulator::new(sampler, Dimension::of::<D>());
-    let (mut first, mut blocks) = (0, 0);
-    while first < total {
-        if blocks >= BLOCKS_BETWEEN_LOOKS || first == 0 {
-            blocks = 0;
-            if progress.cancelled() {
-                return Err(Cancelled);
-            }
-        }
-        let net = if sampler == Sampler::Sobol && watch.is_none() {
-            // To where the target is looked at next.
-            let end = if target.is_some() { (first + 1).next_power_of_two().max(Target::FEWEST as usize) } else { total };
-            Net::after(first, end.min(total) - first, Dimension::of::<D>())
-        } else {
-            None
-        };
-        match (net, &mut source) {
-            (Some(net), Source::Sequence { sequence, frame, .. }) => {
-                let mut escaped = [0; LEAST];
-                for block in 0..net.blocks() {
-                    packets.rays.take_of(net, block, sequence, frame);
-                    net.count(block, packets.open::<L>(&query, around, u64::MAX), &mut escaped);
-                }
-                sequence.skip(net.rays() as u32);
-                accumulator.add_runs((net.rays() / LEAST) as u32, escaped);
-                (first, blocks) = (first + net.rays(), blocks + net.blocks());
-            }
-            (_, source) => {
-                let count = BLOCK.min(total - first);
-                match source {
-                    Source::Sequence { sequence, frame, .. } => packets.rays.take(sequence, frame, count),
-                    Source::Directions(directions) => {
-                        packets.rays.set(&directions[first..first + count], &side);
-                        // Left out only if all rays surely are on its side.
-                        let on_side = packets.rays.lowest::<L>(count) > 1e-5;
-                        query.normal = if on_side { side } else { Vector::zeros() };
-                    }
-                }
-                let open = packets.open::<L>(&query, around, u64::MAX >> (BLOCK - count));
-                if let Some(watch) = &mut watch {
-                    packets.rays.tell(open, count, watch);
-                }
-                accumulator.add(open, count as u32);
-                (first, blocks) = (first + count, blocks + 1);
-            }
-        }
-        if target.is_some_and(|target| target.is_met(&accumulator)) {
+    // The net whose blocks have their turn, which of them is next, and what has escaped of its runs.
+    let (mut net, mut turn, mut escaped) = (None, 0, [0; LEAST]);
+    let mut first = 0;
+    for block in 0.. {
+        if first == total || (turn == 0 && target.is_some_and(|target| target.is_met(&accumulator))) {
             break;
+        }
+        if block % BLOCKS_BETWEEN_LOOKS == 0 && progress.cancelled() {
+            return Err(Cancelled);
+        }
+        if turn == 0 && sampler == Sampler::Sobol && watch.is_none() {
+            // No further than to where the target is looked at next.
+            let end = if target.is_some() { Target::next_look(first) } else { total };
+            net = Net::after(first, end.min(total) - first, Dimension::of::<D>());
+        }
+        let count = BLOCK.min(total - first);
+        match (&mut source, net) {
+            (Source::Sequence { sequence, frame, .. }, Some(net)) => packets.rays.take_of(net, turn, sequence, frame),
+            (Source::Sequence { sequence, frame, .. }, None) => packets.rays.take(sequence, frame, count),
+            (Source::Directions(directions), _) => {
+                packets.rays.set(&directions[first..first + count], &side);
+                // Left out only if all rays surely are on its side.
+                query.normal = if packets.rays.lowest::<L>(count) > 1e-5 { side } else { Vector::zeros() };
+            }
+        }
+        let open = packets.open::<L>(&query, around, u64::MAX >> (BLOCK - count));
+        first += count;
+        let Some(of) = net else {
+            if let Some(watch) = &mut watch {
+                packets.rays.tell(open, count, watch);
+            }
+            accumulator.add(open, count as u32);
+            continue;
+        };
+        of.count(turn, open, &mut escaped);
+        turn += 1;
+        if turn == of.blocks()
+            && let Source::Sequence { sequence, .. } = &mut source
+        {
+            sequence.skip(of.rays() as u32);
+            accumulator.add_runs((of.rays() / LEAST) as u32, escaped);
+            (turn, escaped) = (0, [0; LEAST]);
         }
     }
     Ok(accumulator)
