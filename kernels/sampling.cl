@@ -3,23 +3,32 @@
 
 #pragma OPENCL FP_CONTRACT OFF
 
-uint reversed(uint x) {
-    x = (x >> 1 & 0x55555555u) | (x & 0x55555555u) << 1;
-    x = (x >> 2 & 0x33333333u) | (x & 0x33333333u) << 2;
-    x = (x >> 4 & 0x0f0f0f0fu) | (x & 0x0f0f0f0fu) << 4;
-    x = (x >> 8 & 0x00ff00ffu) | (x & 0x00ff00ffu) << 8;
-    return x >> 16 | x << 16;
-}
+/* The bits of a number, or of each of several, in reverse order. */
+#define REVERSE(x) \
+    x = (x >> 1 & 0x55555555u) | (x & 0x55555555u) << 1; \
+    x = (x >> 2 & 0x33333333u) | (x & 0x33333333u) << 2; \
+    x = (x >> 4 & 0x0f0f0f0fu) | (x & 0x0f0f0f0fu) << 4; \
+    x = (x >> 8 & 0x00ff00ffu) | (x & 0x00ff00ffu) << 8; \
+    x = x >> 16 | x << 16;
 
 /* Owen's scrambling of the bits, highest first. */
+#define SCRAMBLE(x, key) \
+    REVERSE(x) \
+    x ^= x * 0x3d20adeau; \
+    x += key; \
+    x *= key >> 16 | 1u; \
+    x ^= x * 0x05526c56u; \
+    x ^= x * 0x53a22864u; \
+    REVERSE(x)
+
+uint reversed(uint x) {
+    REVERSE(x)
+    return x;
+}
+
 uint scramble(uint x, uint key) {
-    x = reversed(x);
-    x ^= x * 0x3d20adeau;
-    x += key;
-    x *= key >> 16 | 1u;
-    x ^= x * 0x05526c56u;
-    x ^= x * 0x53a22864u;
-    return reversed(x);
+    SCRAMBLE(x, key)
+    return x;
 }
 
 uint sobol(uint index, uint dimension, __global const uint *matrices) {
@@ -101,9 +110,78 @@ float4 sampled(Point point, uint next, __global const uint *matrices) {
     return point.turned ? -world : world;
 }
 
+#ifdef SETS
+/* The same for eight rays, from number `next` on, which is a multiple of 8; without branches. Coordinates of points are never zero. */
+
+/* A coordinate of the points, of whose indices all bits but the lowest three are those of `base`. */
+float8 coordinate_of_8(uint8 index, uint base, uint dimension, uint key, __global const uint *matrices) {
+    uint8 x = (uint8)(sobol(base, dimension, matrices));
+    if (dimension == 0)
+        x |= (index & 1u) << 31 | (index & 2u) << 29 | (index & 4u) << 27;
+    else
+        for (uint bit = 0; bit < 3; bit++) x ^= (0u - (index >> bit & 1u)) & matrices[32 * (dimension - 1) + bit];
+    SCRAMBLE(x, key)
+    return (convert_float8(as_int8(x >> 8)) + 0.5f) * (1.0f / 8388608.0f) - 1.0f;
+}
+
+void sampled_8(Point point, uint next, __global const uint *matrices, float8 *out) {
+    uint8 index = next + (uint8)(0, 1, 2, 3, 4, 5, 6, 7);
+    uint key = point.keys.w;
+    SCRAMBLE(index, key)
+    uint base = index.s0 & ~7u;
+    float8 a = coordinate_of_8(index, base, 0, point.keys.x, matrices);
+    float8 b = coordinate_of_8(index, base, 1, point.keys.y, matrices);
+    int8 first = fabs(a) > fabs(b);
+    float8 large = select(b, a, first), small = select(a, b, first);
+    float8 angle = small / large * 0.785398163397448309615660845819875721f, z = angle * angle;
+    float8 sine = 1.0f + z * (-1.0f / 6.0f + z * (1.0f / 120.0f + z * (-1.0f / 5040.0f + z * (1.0f / 362880.0f))));
+    sine = angle * sine;
+    float8 cosine = 1.0f + z * (-0.5f + z * (1.0f / 24.0f + z * (-1.0f / 720.0f + z * (1.0f / 40320.0f))));
+    float8 u = large * cosine, v = large * sine;
+    float8 locals[4];
+    locals[0] = select(v, u, first);
+    locals[1] = select(u, v, first);
+#if D == 4
+    float8 c = coordinate_of_8(index, base, 2, point.keys.z, matrices);
+    float8 radius = max(fabs(a), fabs(b)), shell = max(radius, fabs(c)), r = radius / shell;
+    float8 cap = copysign(1.0f - r * r * (1.0f / 3.0f), c), wall = c / shell * (2.0f / 3.0f);
+    float8 height = select(wall, cap, (int8)(fabs(c) >= radius));
+    float8 across = shell * sqrt(max(1.0f - height * height, (float8)(0.0f))) / radius;
+    locals[0] = locals[0] * across;
+    locals[1] = locals[1] * across;
+    locals[2] = shell * height;
+#endif
+    float8 square = locals[0] * locals[0] + locals[1] * locals[1];
+#if D == 4
+    square = square + locals[2] * locals[2];
+#endif
+    locals[D - 1] = sqrt(max(1.0f - square, (float8)(LOWEST_SQUARED_COSINE)));
+    const float axis[4] = {point.axis.x, point.axis.y, point.axis.z, point.axis.w};
+    float8 product = axis[0] * locals[0] + axis[1] * locals[1];
+    product = product + axis[2] * locals[2];
+#if D == 4
+    product = product + axis[3] * locals[3];
+#endif
+    float8 scale = point.factor * product;
+    for (int k = 0; k < D; k++) {
+        float8 world = locals[k] - scale * axis[k];
+        out[k] = point.turned ? -world : world;
+    }
+}
+#endif
+
 /* Directions alone, to see whether this device makes the right ones. */
 __kernel void directions(__global const Point *points, __global const uint *matrices, uint rays, __global float4 *out) {
     size_t i = get_global_id(0);
     Point point = points[i / rays];
+#ifdef SETS
+    float8 eight[4];
+    eight[3] = (float8)(0.0f);
+    sampled_8(point, point.next + (uint)(i % rays & ~7u), matrices, eight);
+    float lanes[4][8];
+    for (int k = 0; k < 4; k++) vstore8(eight[k], 0, lanes[k]);
+    out[i] = (float4)(lanes[0][i % 8], lanes[1][i % 8], lanes[2][i % 8], lanes[3][i % 8]);
+#else
     out[i] = sampled(point, point.next + (uint)(i % rays), matrices);
+#endif
 }

@@ -86,6 +86,14 @@ float4 inverted(float4 direction) {
     return 1.0f / copysign(max(size, 1e-20f), direction);
 }
 
+/* A bit for each lane that is true. */
+uint bits_of(int8 lanes) {
+    int8 bits = lanes & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+    int4 half_ = bits.lo | bits.hi;
+    int2 quarter = half_.lo | half_.hi;
+    return (uint)(quarter.x | quarter.y);
+}
+
 /* Which of a node's boxes the ray enters before `limit`, a bit each, and distances before which it doesn't. No box is missed that
    holds a hit: boxes are an ulp larger than what they hold; `slack` is more than the rounding of the difference, the products
    and the sum of a side, eight half-ulps of its terms; and the comparison allows for that of the reciprocals. */
@@ -106,10 +114,7 @@ uint boxes(__global const Node *node, float4 position, float4 inverse, float lim
         leave = min(leave, mad(convert_float8(as_uchar8(far)), (float8)(step), (float8)(start + slack)));
     }
     *distances = enter;
-    int8 met = (enter * (1.0f - 2e-6f) <= leave * (1.0f + 2e-6f)) & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
-    int4 half_ = met.lo | met.hi;
-    int2 quarter = half_.lo | half_.hi;
-    return (uint)(quarter.x | quarter.y);
+    return bits_of(enter * (1.0f - 2e-6f) <= leave * (1.0f + 2e-6f));
 }
 
 /* The place of the lowest bit that is set, and the bits without it. */

@@ -3,12 +3,16 @@
 //! ```text
 //! cargo bench --bench occlusion -- [NAMES or parts of them] [--sizes 10k,100k,1m] [--rays 64,256] [--level avx2]
 //!                                  [--max-rays 2e6] [--rounds 3] [--no-embree]
+//! cargo bench --bench occlusion -- --visits | --once    [as above]
 //! ```
 //!
 //! Embree (3, Debian's `libembree-dev`) is used if it and `g++` are there. Each row times
 //! - `ours`: the rays that Embree gets (origins off the surface, a stratified pattern), with the mean value;
 //! - `default`: what a run of the program computes (no offset, Sobol' points, the surface's own folds);
 //! - `embree`: the best of its single rays, packets of eight and streams.
+//!
+//! `--visits` prints instead what the mean ray of *default* goes through; `--once` traces these rays once and prints nothing, so that
+//! another program can count instructions.
 //!
 //! Above the budget of rays, evenly spread blocks of 64 vertices are traced. Times are the thread's own, medians of the
 //! rounds, ours and Embree's in turn.
@@ -24,7 +28,7 @@ use ao4d::accel::Tracer;
 use ao4d::geometry::{Vector, Vector64};
 use ao4d::mesh::{MeshBuilder, Orientation, Surface};
 use ao4d::progress::Silent;
-use ao4d::trace::cpu::{Level, PacketTracer};
+use ao4d::trace::cpu::{Level, PacketTracer, Visits};
 use ao4d::trace::{Sampling, ShadingPoint};
 use rustix::time::{ClockId, clock_gettime};
 
@@ -36,6 +40,15 @@ struct Options {
     max_rays: f64,
     rounds: usize,
     embree: bool,
+    purpose: Purpose,
+}
+
+/// What rays are traced for.
+#[derive(Clone, Copy, PartialEq)]
+enum Purpose {
+    Times,
+    Visits,
+    Nothing,
 }
 
 /// How long each timing takes at least.
@@ -146,6 +159,31 @@ fn run<const D: usize>(name: &str, options: &Options, program: Option<&Path>, fo
         let list = rays::work_list(mesh.vertices.len(), samples, options.max_rays);
         let sampling = Sampling::new(samples as u32, 1);
         let mut packets = PacketTracer::<D>::new(options.level);
+        if options.purpose != Purpose::Times {
+            let mut visits = Visits::default();
+            for &v in &list {
+                let point = ShadingPoint::Vertex(v);
+                let _ = if options.purpose == Purpose::Visits {
+                    packets.counted(&tracer, &point, &sampling, &mut visits, &Silent)
+                } else {
+                    packets.estimate(&tracer, &point, &sampling, &Silent)
+                };
+            }
+            if options.purpose == Purpose::Visits {
+                let a_ray = |count: u64| count as f64 / visits.rays as f64;
+                println!(
+                    "{name:12} {samples:4}  {:8.3} {:8.2}  {:8.3} {:8.2}  {:8.3} {:8.3}  {:8.5}",
+                    a_ray(visits.set_nodes),
+                    a_ray(visits.set_node_rays),
+                    a_ray(visits.set_leaves),
+                    a_ray(visits.set_leaf_rays),
+                    a_ray(visits.single_nodes),
+                    a_ray(visits.single_leaves),
+                    a_ray(visits.doubts)
+                );
+            }
+            continue;
+        }
         let mut directions: Vec<Vector<D>> = Vec::new();
         let (mut ours, mut default, mut theirs) = (vec![], vec![], vec![]);
         for _ in 0..options.rounds {
@@ -189,6 +227,7 @@ fn main() {
         max_rays: 2e6,
         rounds: 3,
         embree: true,
+        purpose: Purpose::Times,
     };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -196,6 +235,8 @@ fn main() {
         match argument.as_str() {
             "--bench" => {}
             "--no-embree" => options.embree = false,
+            "--visits" => options.purpose = Purpose::Visits,
+            "--once" => options.purpose = Purpose::Nothing,
             "--sizes" => options.sizes = value().split(',').map(str::to_owned).collect(),
             "--rays" => options.rays = value().split(',').filter_map(|x| x.parse().ok()).collect(),
             "--max-rays" => options.max_rays = value().parse().unwrap_or(2e6),
@@ -210,9 +251,22 @@ fn main() {
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/bench-occlusion");
     std::fs::create_dir_all(&folder).unwrap();
-    let program = if options.embree { embree(&folder) } else { None };
-    println!("{:?}; Mrays/s of one thread's time, and mean values", options.level);
-    println!("mesh         rays     ours    mean  default    mean   embree    mean  ratio");
+    let program = if options.embree && options.purpose == Purpose::Times { embree(&folder) } else { None };
+    match options.purpose {
+        Purpose::Times => {
+            println!("{:?}; Mrays/s of one thread's time, and mean values", options.level);
+            println!("mesh         rays     ours    mean  default    mean   embree    mean  ratio");
+        }
+        Purpose::Visits => {
+            println!(
+                "What the mean ray goes through: nodes and leaves by sets of rays, by itself, and leaves in doubt"
+            );
+            println!(
+                "mesh         rays  by sets at nodes   of rays  at leaves  of rays  by itself at nodes  leaves  doubts"
+            );
+        }
+        Purpose::Nothing => {}
+    }
     let mut ratios = vec![];
     for size in &options.sizes {
         for shape in ["bumpy3", "cubes3", "knot3", "soup3", "bumpy4", "cubes4", "soup4"] {

@@ -6,7 +6,7 @@ use ao4d::geometry::{Ray, Vector, Vector64};
 use ao4d::mesh::{Mesh, Surface};
 use ao4d::occlusion::{Estimates, Estimator};
 use ao4d::progress::Silent;
-use ao4d::trace::cpu::{CpuBackend, Level, PacketTracer, ScalarBackend};
+use ao4d::trace::cpu::{CpuBackend, Level, PacketTracer, ScalarBackend, Visits};
 use ao4d::trace::{RayBackend, Sampler, Sampling, ShadingPoint, Target};
 
 use crate::support::{Random, mesh};
@@ -84,7 +84,8 @@ fn check<const D: usize>(name: &str, surface: &Surface<D>, sampling: &Sampling) 
     let vertices = ShadingPoint::vertices(tracer.mesh());
     let points = [vertices.clone(), visible_points(tracer.mesh(), &mut Random(11))].concat();
     let mut values = Vec::new();
-    for target in [None, Some(Target { error: 0.04 })] {
+    let fine = (sampling.samples > 1000).then_some(0.012);
+    for target in [None, Some(0.04)].into_iter().chain([fine]).map(|error| error.map(|error| Target { error })) {
         let sampling = Sampling { target, ..*sampling };
         let slow = estimate(&ScalarBackend::new(tracer.clone()), &points, &sampling);
         for level in Level::available() {
@@ -119,6 +120,10 @@ fn scenes<const D: usize>() {
     dark("dense soup", &soup(1, 100, 1.0, false), &sampling(Sampler::Sobol, 100, f32::INFINITY));
     dark("coarse soup", &soup(2, 60, 0.5, true), &sobol);
     dark("coarse soup", &soup(3, 70, 0.5, true), &sampling(Sampler::Random, 77, f32::INFINITY));
+    // Blocks of neighbours: sixteen, four and one at a time, and the rest.
+    for samples in [256, 320, 1024, 1700] {
+        dark("small soup", &soup(1, 30, 0.4, false), &sampling(Sampler::Sobol, samples, f32::INFINITY));
+    }
     dark("bumps", &graph(few, bumps), &sobol);
     dark("bumps", &graph(few, bumps), &sampling(Sampler::Sobol, 200, f32::INFINITY));
     dark("fold", &graph(few, fold), &sobol);
@@ -175,6 +180,23 @@ fn all_levels_give_the_slow_values_in_3d() {
 #[test]
 fn all_levels_give_the_slow_values_in_4d() {
     scenes::<4>();
+}
+
+#[test]
+fn counting_visits_changes_nothing() {
+    let tracer = Tracer::new(mesh(&soup::<3>(1, 3000, 0.1, false)));
+    let sampling = sampling(Sampler::Sobol, 256, f32::INFINITY);
+    let (mut packets, mut visits) = (PacketTracer::default(), Visits::default());
+    for vertex in 0..100 {
+        let point = ShadingPoint::Vertex(vertex);
+        let counted = packets.counted(&tracer, &point, &sampling, &mut visits, &Silent).unwrap();
+        assert_eq!(counted, packets.estimate(&tracer, &point, &sampling, &Silent).unwrap());
+    }
+    // A ray is blocked before, or goes through the root and, if it escapes, through no less.
+    assert!((12_800..=25_600).contains(&visits.rays), "{visits:?}");
+    assert!(visits.set_node_rays >= visits.rays && visits.set_node_rays <= 64 * visits.set_nodes, "{visits:?}");
+    assert!(visits.set_leaf_rays >= visits.set_leaves && visits.single_leaves > visits.doubts, "{visits:?}");
+    assert!(visits.single_nodes > 0 && visits.set_leaves > 0, "{visits:?}");
 }
 
 fn any_rays<const D: usize>() {

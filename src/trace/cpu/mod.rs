@@ -7,7 +7,7 @@ mod packet;
 mod passing;
 mod scalar;
 
-pub use packet::{Level, PacketTracer};
+pub use packet::{Level, PacketTracer, Visits};
 pub use scalar::{ScalarBackend, estimate_at};
 
 pub(super) use scalar::first_hit;

@@ -235,9 +235,10 @@ mod tests {
         };
         let expected = ask(&cpu);
         for tuning in [
-            Tuning { piece: None, lanes: Some(2) },
-            Tuning { piece: Some(60), lanes: Some(1) },
-            Tuning { piece: Some(149), lanes: Some(3) },
+            Tuning { piece: None, lanes: Some(2), sets: Some(false) },
+            Tuning { piece: Some(60), lanes: Some(1), sets: Some(true) },
+            Tuning { piece: Some(149), lanes: Some(3), sets: Some(false) },
+            Tuning { piece: None, lanes: Some(2), sets: Some(true) },
         ] {
             let device = OpenClBackend { tuning, ..OpenClBackend::new(opencl, Arc::clone(&tracer)) };
             assert!(ask(&device) == expected, "{tuning:?}");

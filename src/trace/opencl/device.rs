@@ -44,18 +44,21 @@ pub(super) struct Kernels {
     pub directions: Kernel,
     pub occluded: Kernel,
     pub occluded_again: Kernel,
+    /// Instead of `occluded`, for sets of rays, if that is what the program is made for.
+    pub occluded_sets: Option<Kernel>,
     pub packed: Kernel,
     pub first_hit: Kernel,
 }
 
 impl Kernels {
-    fn of(program: Arc<Program>) -> Result<Self, (&'static str, ClError)> {
+    fn of(program: Arc<Program>, sets: bool) -> Result<Self, (&'static str, ClError)> {
         let kernel = |name: &'static str| Kernel::create(&program, name).map_err(|error| (name, error));
         Ok(Self {
             layout: kernel("layout")?,
             directions: kernel("directions")?,
             occluded: kernel("occluded")?,
             occluded_again: kernel("occluded_again")?,
+            occluded_sets: if sets { Some(kernel("occluded_sets")?) } else { None },
             packed: kernel("packed")?,
             first_hit: kernel("first_hit")?,
             program,
@@ -132,14 +135,14 @@ impl Device {
 
     /// Compiles the kernels, and sees that structs are what they should be.
     pub fn build(&self, shape: Shape) -> Result<Kernels, Error> {
-        self.compile(&program::text(shape, self.info.double))
+        self.compile(&program::text(shape, self.info.double), shape.sets)
     }
 
     fn most_of_group(&self, kernel: &Kernel) -> usize {
         kernel.get_work_group_size(self.info.id as cl_device_id).unwrap_or(1).max(1)
     }
 
-    fn compile(&self, text: &str) -> Result<Kernels, Error> {
+    fn compile(&self, text: &str, sets: bool) -> Result<Kernels, Error> {
         let options =
             if self.info.rounded { "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt" } else { "-cl-std=CL1.2" };
         let id = self.info.id as cl_device_id;
@@ -150,7 +153,7 @@ impl Device {
         let refuse = |reason: String| Error::Build { device: self.info.label(), reason, log: log.trim().to_owned() };
         built.map_err(|error| refuse(explain(&error)))?;
         // Some compilers report success and leave kernels out.
-        let kernels = Kernels::of(Arc::new(program))
+        let kernels = Kernels::of(Arc::new(program), sets)
             .map_err(|(name, error)| refuse(format!("no kernel `{name}`, {}", explain(&error))))?;
         let expected = program::expected_layout();
         let sizes = self.output::<u32>(expected.len(), "sizes of structs")?;
@@ -165,7 +168,8 @@ impl Device {
 
     /// The same kernels again, as each can have only one set of arguments.
     pub fn again(&self, kernels: &Kernels) -> Result<Kernels, Error> {
-        Kernels::of(Arc::clone(&kernels.program)).map_err(|(_, error)| self.failed("making a kernel")(error))
+        Kernels::of(Arc::clone(&kernels.program), kernels.occluded_sets.is_some())
+            .map_err(|(_, error)| self.failed("making a kernel")(error))
     }
 
     /// Memory for so many results of a kernel, at least one.
@@ -309,15 +313,16 @@ mod tests {
     #[ignore = "needs an OpenCL device: run tests/all"]
     fn what_the_compiler_says_is_told() {
         let device = open();
-        let shape = Shape { dimension: 4, depth: 20, piece: None };
+        let shape = Shape { dimension: 4, depth: 20, sets: true, piece: None };
         let text = program::text(shape, device.info.double);
-        let broken = device.compile(&text.replace("float4 position;", "flaot4 position;")).unwrap_err().to_string();
+        let broken =
+            device.compile(&text.replace("float4 position;", "flaot4 position;"), true).unwrap_err().to_string();
         assert!(broken.contains("don't compile") && broken.contains("flaot4"), "{broken}");
-        let missing = device.compile(&text.replace("first_hit(", "last_hit(")).unwrap_err().to_string();
+        let missing = device.compile(&text.replace("first_hit(", "last_hit("), true).unwrap_err().to_string();
         assert!(missing.contains("no kernel `first_hit`"), "{missing}");
-        let other = device.compile(&text.replace("uint next;", "uint next, more[4];")).unwrap_err();
+        let other = device.compile(&text.replace("uint next;", "uint next, more[4];"), true).unwrap_err();
         assert!(matches!(other, Error::Layout { .. }), "{other}");
-        assert!(device.compile(&text).is_ok());
+        assert!(device.compile(&text, true).is_ok());
     }
 
     #[test]

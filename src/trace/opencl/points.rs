@@ -28,6 +28,8 @@ const FEW_RAYS: usize = 1 << 19;
 
 /// Points that one thread prepares at a time.
 const BLOCK: usize = 512;
+/// Rays that a work-item takes, where it takes a set of a point's.
+const SET: usize = 64;
 
 /// A point with what its rays need.
 struct Prepared {
@@ -284,8 +286,12 @@ impl<const D: usize> OpenClBackend<D> {
         };
         let kernels = &on_device.kernels;
         let mut arguments = rays();
-        arguments.extend([Argument::U64(total as u64), found.argument()]);
-        device.launch(&kernels.occluded, &arguments, total)?;
+        let (kernel, items) = match &kernels.occluded_sets {
+            Some(kernel) => (kernel, part.len() * size.div_ceil(SET)),
+            None => (&kernels.occluded, total),
+        };
+        arguments.extend([Argument::U64(items as u64), found.argument()]);
+        device.launch(kernel, &arguments, items)?;
         let arguments = [found.argument(), Argument::U64(total as u64), open.argument(), unsure.argument()];
         device.launch(&kernels.packed, &arguments, words)?;
         device.read(open, &mut is_open.0)?;

@@ -7,6 +7,7 @@ const LAYOUT: &str = include_str!("../../../kernels/layout.cl");
 const SAMPLING: &str = include_str!("../../../kernels/sampling.cl");
 const CONE: &str = include_str!("../../../kernels/cone.cl");
 const TRACE: &str = include_str!("../../../kernels/trace.cl");
+const SETS: &str = include_str!("../../../kernels/sets.cl");
 
 /// The most pieces of memory for corners: a device takes at least a quarter of all it has in one piece.
 pub(super) const PIECES: usize = 4;
@@ -25,6 +26,8 @@ pub(super) struct Shape {
     pub dimension: usize,
     /// Nodes on the longest way through the hierarchy.
     pub depth: usize,
+    /// Whether rays go through the hierarchy in sets, a work-item for each 64 of a point.
+    pub sets: bool,
     /// The most simplices whose corners are in one piece of memory, if there are several pieces.
     pub piece: Option<usize>,
 }
@@ -44,12 +47,18 @@ pub(super) fn text(shape: Shape, double: bool) -> String {
     if double {
         text += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n#define DOUBLE\n";
     }
+    if shape.sets {
+        text += "#define SETS\n";
+    }
     text += LAYOUT;
     text += SAMPLING;
     if double {
         text += CONE;
     }
     text += TRACE;
+    if shape.sets {
+        text += SETS;
+    }
     without_comments(&text)
 }
 
@@ -76,15 +85,16 @@ mod tests {
 
     #[test]
     fn texts_are_plain() {
-        for n in 0..8 {
-            let (dimension, double) = (3 + n % 2, n & 2 > 0);
-            let shape = Shape { dimension, depth: 20, piece: (n & 4 > 0).then_some(1000) };
+        for n in 0..16 {
+            let (dimension, double, sets) = (3 + n % 2, n & 2 > 0, n & 8 > 0);
+            let shape = Shape { dimension, depth: 20, sets, piece: (n & 4 > 0).then_some(1000) };
             let text = text(shape, double);
             assert!(text.is_ascii() && !text.contains("/*") && !text.contains("//") && !text.contains("??/"));
             assert!(!text.contains("\\\n"));
             for kernel in KERNELS {
                 assert_eq!(text.matches(&format!("void {kernel}(")).count(), 1, "{kernel}");
             }
+            assert_eq!(text.contains("void occluded_sets("), sets);
             let opened = text.matches("#if").count();
             assert_eq!(opened, text.matches("#endif").count());
             assert_eq!(text.contains("double4"), double);

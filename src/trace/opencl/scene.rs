@@ -34,6 +34,8 @@ pub(super) struct Tuning {
     pub piece: Option<usize>,
     /// How many launches are prepared at a time.
     pub lanes: Option<usize>,
+    /// Whether rays are traced in sets.
+    pub sets: Option<bool>,
 }
 
 /// The mesh on the devices.
@@ -141,13 +143,15 @@ impl Scene {
         let vertices: Vec<[u32; 4]> = wide.order.par_iter().map(vertices).collect();
         let mut parts = Vec::new();
         for device in &opencl.devices {
-            let is_gpu = device.info.kind == Kind::Gpu;
+            let (is_gpu, is_processor) = (device.info.kind == Kind::Gpu, device.info.kind == Kind::Cpu);
             let fits = device.info.largest as usize / (facet::vectors::<D>() * size_of::<Float4>());
             let most = tuning.piece.unwrap_or(if device.info.largest == 0 { usize::MAX } else { fits.max(1) });
             let is_whole = wide.order.len() <= most;
             let shape = Shape {
                 dimension: D,
                 depth: wide.depth,
+                // What a processor has side by side is in its registers.
+                sets: tuning.sets.unwrap_or(is_processor),
                 piece: (!is_whole).then(|| wide.order.len().div_ceil(PIECES).max(1)),
             };
             let kernels = device.build(shape)?;
@@ -173,7 +177,7 @@ impl Scene {
                 Part { device, makes_directions, on_device }
             };
             // A processor has nothing better to do than the device's work.
-            for _ in 1..tuning.lanes.unwrap_or(if device.info.kind == Kind::Cpu { 1 } else { 2 }) {
+            for _ in 1..tuning.lanes.unwrap_or(if is_processor { 1 } else { 2 }) {
                 parts.push(part(Arc::new(device.beside()?), device.again(&kernels)?));
             }
             parts.push(part(Arc::clone(device), kernels));

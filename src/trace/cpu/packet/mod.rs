@@ -15,6 +15,7 @@
 //! - [`view`]: how a leaf lies to the origin;
 //! - [`single`]: one ray against the simplices of a leaf;
 //! - [`cones`]: eight simplices as cones seen from the shading point;
+//! - [`tally`]: how much is visited, for measurements;
 //! - [`tracer`]: all of this, point after point.
 
 mod boxes;
@@ -27,6 +28,7 @@ mod nets;
 mod query;
 mod single;
 mod star;
+mod tally;
 mod tracer;
 mod traverse;
 mod view;
@@ -34,4 +36,5 @@ mod view;
 mod x86;
 
 pub use level::Level;
+pub use tally::Visits;
 pub use tracer::PacketTracer;

@@ -8,6 +8,7 @@ use super::level::{with_avx2, with_avx512};
 use super::nets::Net;
 use super::query::Query;
 use super::star::VertexStar;
+use super::tally::{Tally, Visits};
 use super::traverse::Traversal;
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2, Avx512};
@@ -53,12 +54,13 @@ struct AtVertex<'a, const D: usize> {
 }
 
 /// All that is asked at once.
-struct Job<'a, 'w, const D: usize> {
+struct Job<'a, 'w, T, const D: usize> {
     query: Query<'a, D>,
     vertex: Option<AtVertex<'a, D>>,
     source: Source<'a, D>,
     watch: Option<&'a mut Watch<'w, D>>,
     progress: &'a dyn Progress,
+    tally: &'a mut T,
 }
 
 impl<const D: usize> Default for PacketTracer<D> {
@@ -91,7 +93,7 @@ impl<const D: usize> PacketTracer<D> {
         if tracer.mesh().is_translucent() {
             return estimate_at(tracer, point, sampling, progress);
         }
-        self.at(tracer, point, sampling, None, progress)
+        self.at(tracer, point, sampling, None, progress, &mut ())
     }
 
     /// The same, and tells each ray to `watch`, in the order of the [`Sequence`]. Objects that let light through count as
@@ -107,16 +109,32 @@ impl<const D: usize> PacketTracer<D> {
         watch: &mut Watch<D>,
         progress: &dyn Progress,
     ) -> Result<Estimate, Cancelled> {
-        self.at(tracer, point, sampling, Some(watch), progress)
+        self.at(tracer, point, sampling, Some(watch), progress, &mut ())
     }
 
-    fn at(
+    /// The same without `watch`, and adds to `visits` what the rays went through.
+    ///
+    /// # Errors
+    /// [`Cancelled`] if `progress` says so.
+    pub fn counted(
+        &mut self,
+        tracer: &Tracer<D>,
+        point: &ShadingPoint<D>,
+        sampling: &Sampling,
+        visits: &mut Visits,
+        progress: &dyn Progress,
+    ) -> Result<Estimate, Cancelled> {
+        self.at(tracer, point, sampling, None, progress, visits)
+    }
+
+    fn at<T: Tally>(
         &mut self,
         tracer: &Tracer<D>,
         point: &ShadingPoint<D>,
         sampling: &Sampling,
         watch: Option<&mut Watch<D>>,
         progress: &dyn Progress,
+        tally: &mut T,
     ) -> Result<Estimate, Cancelled> {
         let mesh = tracer.mesh();
         let (position, normal) = (point.position(mesh), point.normal(mesh));
@@ -146,7 +164,7 @@ impl<const D: usize> PacketTracer<D> {
             samples: sampling.samples,
             target: sampling.target,
         };
-        Ok(self.traced(Job { query, vertex, source, watch, progress })?.estimate())
+        Ok(self.traced(Job { query, vertex, source, watch, progress, tally })?.estimate())
     }
 
     /// How many of the rays from a point in these directions, none longer than 1, hit a simplex other than `ignored`
@@ -168,14 +186,14 @@ impl<const D: usize> PacketTracer<D> {
         let query = Query::new(tracer, *origin, (normal, 0.0), limit, ignored.as_slice(), None);
         let source = Source::Directions(directions);
         // Nobody cancels.
-        let found = self.traced(Job { query, vertex: None, source, watch: None, progress: &Silent });
+        let found = self.traced(Job { query, vertex: None, source, watch: None, progress: &Silent, tally: &mut () });
         found.map_or(0, |found| found.rays() - found.escaped())
     }
 
     /// Chooses the code compiled for the level.
-    fn traced(&mut self, job: Job<D>) -> Result<Accumulator, Cancelled> {
+    fn traced<T: Tally>(&mut self, job: Job<T, D>) -> Result<Accumulator, Cancelled> {
         match self.level {
-            Level::Portable => traced::<Portable, D>(self, job),
+            Level::Portable => traced::<Portable, T, D>(self, job),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `new` has checked that the processor has all features of the level, which are the very list that
             // the function is compiled for.
@@ -184,7 +202,7 @@ impl<const D: usize> PacketTracer<D> {
             // SAFETY: as above.
             Level::Avx512 => unsafe { traced_avx512(self, job) },
             #[cfg(not(target_arch = "x86_64"))]
-            _ => traced::<Portable, D>(self, job),
+            _ => traced::<Portable, T, D>(self, job),
         }
     }
 }
@@ -192,10 +210,10 @@ impl<const D: usize> PacketTracer<D> {
 impl<const D: usize> PacketTracer<D> {
     /// Which of the rays `alive` escape.
     #[inline(always)]
-    fn open<L: Lanes>(&mut self, query: &Query<D>, around: &[u32], alive: u64) -> u64 {
+    fn open<L: Lanes, T: Tally>(&mut self, query: &Query<D>, around: &[u32], alive: u64, tally: &mut T) -> u64 {
         self.rays.complete();
         let hidden = self.star.hidden::<L>(query, &self.rays, around, alive);
-        let hit = self.traversal.blocked::<L>(query, &self.rays, alive & !hidden);
+        let hit = self.traversal.blocked::<L, T>(query, &self.rays, alive & !hidden, tally);
         let open = alive & !(hidden | hit);
         if query.wide.far.nodes.is_empty() { open } else { open & !query.hits_far(&self.rays, open) }
     }
@@ -206,8 +224,8 @@ impl<const D: usize> PacketTracer<D> {
 macro_rules! compiled_for_avx2 {
     ($($feature:tt)+) => {
         #[target_feature($(enable = $feature),+)]
-        fn traced_avx2<const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
-            traced::<Avx2, D>(packets, job)
+        fn traced_avx2<T: Tally, const D: usize>(packets: &mut PacketTracer<D>, job: Job<T, D>) -> Result<Accumulator, Cancelled> {
+            traced::<Avx2, T, D>(packets, job)
         }
     };
 }
@@ -217,8 +235,8 @@ macro_rules! compiled_for_avx2 {
 macro_rules! compiled_for_avx512 {
     ($($feature:tt)+) => {
         #[target_feature($(enable = $feature),+)]
-        fn traced_avx512<const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
-            traced::<Avx512, D>(packets, job)
+        fn traced_avx512<T: Tally, const D: usize>(packets: &mut PacketTracer<D>, job: Job<T, D>) -> Result<Accumulator, Cancelled> {
+            traced::<Avx512, T, D>(packets, job)
         }
     };
 }
@@ -230,8 +248,11 @@ with_avx512!(compiled_for_avx512);
 
 /// Counts the rays that escape.
 #[inline(always)]
-fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) -> Result<Accumulator, Cancelled> {
-    let Job { mut query, vertex, mut source, mut watch, progress } = job;
+fn traced<L: Lanes, T: Tally, const D: usize>(
+    packets: &mut PacketTracer<D>,
+    job: Job<T, D>,
+) -> Result<Accumulator, Cancelled> {
+    let Job { mut query, vertex, mut source, mut watch, progress, tally } = job;
     let side = query.normal;
     let around = match &vertex {
         Some(at) => {
@@ -273,7 +294,7 @@ fn traced<L: Lanes, const D: usize>(packets: &mut PacketTracer<D>, job: Job<D>) 
                 query.normal = if packets.rays.lowest::<L>(count) > 1e-5 { side } else { Vector::zeros() };
             }
         }
-        let open = packets.open::<L>(&query, around, u64::MAX >> (BLOCK - count));
+        let open = packets.open::<L, T>(&query, around, u64::MAX >> (BLOCK - count), tally);
         first += count;
         let Some(of) = net else {
             if let Some(watch) = &mut watch {

@@ -14,6 +14,7 @@ use super::directions::{BLOCK, Rays};
 use super::lanes::Lanes;
 use super::leaves::{hits_of_one, hits_of_set};
 use super::query::Query;
+use super::tally::Tally;
 use crate::accel::{BOTTOM, LEAF, NODE, Reference, WIDTH, WideNode, place};
 
 /// Fewer rays than this at a node go their own ways.
@@ -90,7 +91,8 @@ impl<const D: usize> Traversal<D> {
 
     /// Which of the rays `alive` hit something.
     #[inline(always)]
-    pub fn blocked<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, alive: u64) -> u64 {
+    pub fn blocked<L: Lanes, T: Tally>(&mut self, query: &Query<D>, rays: &Rays<D>, alive: u64, tally: &mut T) -> u64 {
+        tally.rays(alive.count_ones());
         let Some(root) = query.wide.root() else { return 0 };
         self.make_room(query.wide.depth);
         let limit = L::splat(query.box_limit());
@@ -107,10 +109,12 @@ impl<const D: usize> Traversal<D> {
                     continue;
                 }
                 if reference & KIND == LEAF {
+                    tally.set_at_leaf(set.count_ones());
                     open &= !hits_of_set::<L, D>(query, rays, reference, set);
                     continue;
                 }
                 let node = WideNode::<D>::at(query.rows, reference);
+                tally.set_at_node(set.count_ones());
                 let met = meet_set(query, rays, limit, node, set);
                 let [Some(many), Some(few)] = [(&mut self.sets, sets), (&mut self.parted, parted)]
                     .map(|(list, end)| list[end..].first_chunk_mut::<WIDTH>())
@@ -129,7 +133,7 @@ impl<const D: usize> Traversal<D> {
                 }
                 (sets, parted) = (sets + more, parted + fewer);
             }
-            self.follow::<L>(query, rays, limit, parted, &mut open);
+            self.follow::<L, T>(query, rays, limit, parted, &mut open, tally);
         }
         alive & !open
     }
@@ -148,7 +152,15 @@ impl<const D: usize> Traversal<D> {
 
     /// Follows the open rays of the first `parted` sets of few, each by itself.
     #[inline(always)]
-    fn follow<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, limit: L, parted: usize, open: &mut u64) {
+    fn follow<L: Lanes, T: Tally>(
+        &mut self,
+        query: &Query<D>,
+        rays: &Rays<D>,
+        limit: L,
+        parted: usize,
+        open: &mut u64,
+        tally: &mut T,
+    ) {
         self.tops = self.bottoms;
         let mut all = 0;
         for &(set, reference) in &self.parted[..parted] {
@@ -166,12 +178,20 @@ impl<const D: usize> Traversal<D> {
                 self.tops[BLOCK] = self.bottoms[BLOCK];
             }
         }
-        self.singly::<L>(query, rays, limit, all, open);
+        self.singly::<L, T>(query, rays, limit, all, open, tally);
     }
 
     /// The rays of a set, each through what is on its stack.
     #[inline(always)]
-    fn singly<L: Lanes>(&mut self, query: &Query<D>, rays: &Rays<D>, limit: L, mut set: u64, open: &mut u64) {
+    fn singly<L: Lanes, T: Tally>(
+        &mut self,
+        query: &Query<D>,
+        rays: &Rays<D>,
+        limit: L,
+        mut set: u64,
+        open: &mut u64,
+        tally: &mut T,
+    ) {
         let (stacks, tops) = (&mut self.stacks[..], &mut self.tops);
         let (mut at_node, mut at_leaf) = (Queue::new(), Queue::new());
         while set != 0 {
@@ -188,6 +208,7 @@ impl<const D: usize> Traversal<D> {
         }
         while !(at_node.is_empty() && at_leaf.is_empty()) {
             while let Some(i) = at_node.next() {
+                tally.ray_at_node();
                 let top = tops[i] as usize;
                 let node = WideNode::<D>::at(query.rows, stacks[top]);
                 let (mut enter, mut exit) = (L::splat(AHEAD), limit);
@@ -210,8 +231,10 @@ impl<const D: usize> Traversal<D> {
             }
             while let Some(i) = at_leaf.next() {
                 let top = tops[i] as usize;
+                tally.ray_at_leaf();
                 let [mut hit, doubtful] = hits_of_one::<L, D>(query, rays, stacks[top], i);
                 if doubtful {
+                    tally.ray_in_doubt();
                     hit = hits_of_set::<L, D>(query, rays, stacks[top], 1 << i) != 0;
                 }
                 let top = top - 1;
