@@ -3,6 +3,8 @@
 
 #[path = "../support/fuzz.rs"]
 mod fuzz;
+#[path = "../support/on_rays.rs"]
+mod on_rays;
 #[path = "../support/mod.rs"]
 mod support;
 

@@ -1,6 +1,7 @@
 //! The fast engine against the slow one: the same bits at every level of instructions, on scenes that are easy, and on
 //! scenes full of coincidences.
 
+use crate::on_rays::on_rays;
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Ray, Vector, Vector64};
 use ao4d::mesh::{Mesh, Surface};
@@ -180,6 +181,36 @@ fn all_levels_give_the_slow_values_in_3d() {
 #[test]
 fn all_levels_give_the_slow_values_in_4d() {
     scenes::<4>();
+}
+
+fn close_calls<const D: usize>() {
+    // From the coarse to the fine: few rays and large simplices, and nets of several blocks.
+    for (points, simplices, samples, offset) in [
+        (4000, 2, 64, 0.0),
+        (300, 4, 64, 0.0),
+        (100, 30, 64, 0.0),
+        (100, 10, 320, 0.0),
+        (40, 20, 1024, 0.0),
+        (200, 6, 64, 700.0),
+    ] {
+        let sampling = sampling(Sampler::Sobol, samples, f32::INFINITY);
+        let (mesh, points) = on_rays::<D>(points, simplices, offset, &sampling);
+        let tracer = std::sync::Arc::new(Tracer::new(mesh));
+        let slow = ScalarBackend::new(tracer.clone()).open_fractions(&points, &sampling, &Silent).unwrap();
+        for level in Level::available() {
+            let fast =
+                CpuBackend::with_level(tracer.clone(), level).open_fractions(&points, &sampling, &Silent).unwrap();
+            assert!(fast == slow, "{D}D, {samples} rays, {offset}, {level:?}");
+        }
+        let open: f32 = slow.iter().map(|e| e.value).sum::<f32>() / slow.len() as f32;
+        assert!((0.02..0.98).contains(&open), "{open}");
+    }
+}
+
+#[test]
+fn rays_that_all_but_miss_a_corner_are_those_of_the_slow_twin() {
+    close_calls::<3>();
+    close_calls::<4>();
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! OpenCL beside the processor: the same bits, whatever the scene. Needs a device, such as PoCL's, which `tests/all`
 //! installs; what happens without one is tested too.
 
+#[path = "../support/on_rays.rs"]
+mod on_rays;
 mod parity;
 #[path = "../support/smaller.rs"]
 mod smaller;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::on_rays::on_rays;
 use super::smaller;
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Ray, Vector, Vector64};
@@ -205,6 +206,27 @@ fn random_soups_at_all_scales() {
     let opencl = OpenCl::open(&[]).unwrap();
     soups::<3>(&opencl);
     soups::<4>(&opencl);
+}
+
+fn close_calls<const D: usize>(opencl: &OpenCl) {
+    for (points, simplices, samples, offset) in [(4000, 2, 64, 0.0), (100, 30, 64, 0.0), (200, 6, 64, 700.0)] {
+        for max_distance in [f32::INFINITY, 0.03] {
+            let sampling = Sampling { max_distance, ..Sampling::new(samples, 5) };
+            let (mesh, points) = on_rays::<D>(points, simplices, offset, &sampling);
+            let tracer = Arc::new(Tracer::new(mesh));
+            let slow = ScalarBackend::new(tracer.clone()).open_fractions(&points, &sampling, &Silent).unwrap();
+            let found = OpenClBackend::new(opencl, tracer).open_fractions(&points, &sampling, &Silent).unwrap();
+            assert!(found == slow, "{D}D, {simplices} simplices a point, {offset}, {max_distance}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn rays_that_all_but_miss_a_corner_are_those_of_the_slow_twin() {
+    let opencl = OpenCl::open(&[]).unwrap();
+    close_calls::<3>(&opencl);
+    close_calls::<4>(&opencl);
 }
 
 #[test]
