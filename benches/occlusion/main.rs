@@ -11,7 +11,7 @@
 //! - `default`: what a run of the program computes (no offset, Sobol' points, the surface's own folds);
 //! - `embree`: the best of its single rays, packets of eight and streams.
 //!
-//! `--visits` prints instead what the mean ray of *default* goes through; `--once` traces these rays once and prints nothing, so that
+//! `--levels` prints the levels of instructions that this processor has. `--visits` prints instead what the mean ray of *default* goes through; `--once` traces these rays once and prints nothing, so that
 //! another program can count instructions.
 //!
 //! Above the budget of rays, evenly spread blocks of 64 vertices are traced. Times are the thread's own, medians of the
@@ -237,6 +237,9 @@ fn main() {
             "--no-embree" => options.embree = false,
             "--visits" => options.purpose = Purpose::Visits,
             "--once" => options.purpose = Purpose::Nothing,
+            "--levels" => {
+                return Level::available().iter().for_each(|level| println!("{}", format!("{level:?}").to_lowercase()));
+            }
             "--sizes" => options.sizes = value().split(',').map(str::to_owned).collect(),
             "--rays" => options.rays = value().split(',').filter_map(|x| x.parse().ok()).collect(),
             "--max-rays" => options.max_rays = value().parse().unwrap_or(2e6),

@@ -4,8 +4,9 @@
 //! and boxes that all rays meet, as the origin is in them, or that none meets, as they are below the tangent hyperplane, need no
 //! test at all. In scenes of some size that spares a third to a half of the tests.
 
-use super::directions::{BLOCK, Rays};
+use super::directions::Rays;
 use super::lanes::Lanes;
+use super::nets::BLOCK;
 use super::query::Query;
 use super::view::HEIGHT_ROUNDING;
 use crate::accel::{WIDTH, WideNode};

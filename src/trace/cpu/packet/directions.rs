@@ -6,13 +6,10 @@
 //! another order ([`super::nets`]).
 
 use super::lanes::Lanes;
-use super::nets::Net;
+use super::nets::{BLOCK, Net};
 use crate::accel::WIDTH;
 use crate::geometry::{Dimension, Frame, Vector};
 use crate::trace::sampling::{LOWEST_SQUARED_COSINE, Sequence, Source, scramble, scramble_reversed, sobol};
-
-/// Rays of a block; the bits of a `u64` name them.
-pub(super) const BLOCK: usize = 64;
 
 /// The first Sobol' points, each coordinate with its bits reversed.
 static SOBOL_BLOCK: [[u32; BLOCK]; 3] = sobol_block();

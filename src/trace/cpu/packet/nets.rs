@@ -10,11 +10,12 @@
 
 use std::sync::LazyLock;
 
-use super::directions::BLOCK;
 use crate::geometry::Dimension;
 use crate::trace::groups::LEAST;
 use crate::trace::sampling::sobol;
 
+/// Rays of a block; the bits of a `u64` name them.
+pub(super) const BLOCK: usize = 64;
 /// How many blocks the nets have, most first.
 const BLOCKS: [usize; 3] = [16, 4, 1];
 

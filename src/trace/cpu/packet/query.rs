@@ -1,6 +1,7 @@
 //! What is asked: which rays from a point hit a mesh.
 
-use super::directions::{BLOCK, Rays};
+use super::directions::Rays;
+use super::nets::BLOCK;
 use crate::accel::{Leaf, Row, Tracer, WideBvh};
 use crate::geometry::{Ray, Vector};
 

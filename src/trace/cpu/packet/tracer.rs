@@ -1,11 +1,11 @@
 //! The tracer itself: point after point, 64 rays at a time.
 
-use super::directions::{BLOCK, Rays};
+use super::directions::Rays;
 use super::lanes::{Lanes, Portable};
 use super::level::Level;
 #[cfg(target_arch = "x86_64")]
 use super::level::{with_avx2, with_avx512};
-use super::nets::Net;
+use super::nets::{BLOCK, Net};
 use super::query::Query;
 use super::star::VertexStar;
 use super::tally::{Tally, Visits};

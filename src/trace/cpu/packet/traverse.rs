@@ -10,9 +10,10 @@
 //! has no branch that a processor could guess wrong, and what a ray needs next is fetched while the others in its queue have their turn.
 
 use super::boxes::{AHEAD, APART, meet_set};
-use super::directions::{BLOCK, Rays};
+use super::directions::Rays;
 use super::lanes::Lanes;
 use super::leaves::{hits_of_one, hits_of_set};
+use super::nets::BLOCK;
 use super::query::Query;
 use super::tally::Tally;
 use crate::accel::{BOTTOM, LEAF, NODE, Reference, WIDTH, WideNode, place};
