@@ -1,13 +1,17 @@
 /* Sets of rays through the hierarchy, for devices that are processors: a work-item takes up to 64 rays of a point, and what
-   lies side by side in their registers are the eight boxes of a node, or eight of the rays. */
+   lies side by side in their registers are the eight boxes of a node, or eight of the rays. The host tells SET, which is 64. */
 
-#define SET 64
 #define LANES 8
 
 typedef struct {
     float direction[D][SET];
     float inverse[D][SET];
 } Rays;
+
+float4 direction_of(const Rays *rays, uint i) {
+    float last = D == 4 ? rays->direction[D - 1][i] : 0.0f;
+    return (float4)(rays->direction[0][i], rays->direction[1][i], rays->direction[2][i], last);
+}
 
 /* The simplex' part of `crossed` is the same for all rays, which leaves products of their directions with D vectors. Returns the rays
    of the set that hit it for sure; *doubt are those that may. Rays are about 1 long, so the sizes of their components add up to
@@ -140,10 +144,8 @@ ulong blocked_of(MESH, Point point, const Rays *rays, ulong set, float limit, ul
                 for (; doubt != 0; doubt = WITHOUT_LOWEST(doubt)) {
                     ulong bit = doubt & (0ul - doubt);
                     uint i = 63u - (uint)clz(bit);
-                    float4 direction = (float4)(
-                        rays->direction[0][i], rays->direction[1][i], rays->direction[2][i], D == 4 ? rays->direction[D - 1][i] : 0.0f);
                     float t, t_error;
-                    uint one = met(position, direction, FACET_OF(k), CORNERS(k), limit, false, &t, &t_error);
+                    uint one = met(position, direction_of(rays, i), FACET_OF(k), CORNERS(k), limit, false, &t, &t_error);
                     if (one == HIT) hit |= bit;
                     if (one == UNSURE) *unsure |= bit;
                 }
@@ -167,18 +169,18 @@ __kernel void occluded_sets(MESH, uint empty, RAYS, ulong count, __global uchar 
     uint of_point = (rays + SET - 1) / SET, first = (uint)(item % of_point) * SET, own = min((uint)SET, rays - first);
     size_t begin = item / of_point * rays + first;
     Point point = points[item / of_point];
-    float given_[4][SET];
+    float components[4][SET];
     if (use_given) {
         for (uint i = 0; i < own; i++) {
             float4 w = given[begin + i];
-            const float components[4] = {w.x, w.y, w.z, w.w};
-            for (int axis = 0; axis < D; axis++) given_[axis][i] = components[axis];
+            const float one[4] = {w.x, w.y, w.z, w.w};
+            for (int axis = 0; axis < D; axis++) components[axis][i] = one[axis];
         }
     } else {
         for (uint i = 0; i < own; i += LANES) {
             float8 eight[4];
             sampled_8(point, point.next + first + i, matrices, eight);
-            for (int axis = 0; axis < D; axis++) vstore8(eight[axis], i / LANES, given_[axis]);
+            for (int axis = 0; axis < D; axis++) vstore8(eight[axis], i / LANES, components[axis]);
         }
     }
     /* Rays of an orthant side by side, as they are likely to go together. */
@@ -187,8 +189,8 @@ __kernel void occluded_sets(MESH, uint empty, RAYS, ulong count, __global uchar 
     for (uint i = 0; i < own; i++) {
         uint orthant = 0;
         for (int axis = 0; axis < D; axis++) {
-            float w = given_[axis][i];
-            given_[axis][i] = w = fabs(w) < 1e-30f ? 0.0f : w;
+            float w = components[axis][i];
+            components[axis][i] = w = fabs(w) < 1e-30f ? 0.0f : w;
             orthant |= (uint)(w < 0.0f) << axis;
         }
         orthants[i] = orthant;
@@ -200,7 +202,7 @@ __kernel void occluded_sets(MESH, uint empty, RAYS, ulong count, __global uchar 
     ulong hit = 0, unsure = 0;
     for (uint i = 0; i < own; i++) {
         uint lane = starts[orthants[i]]++;
-        for (int axis = 0; axis < D; axis++) all.direction[axis][lane] = given_[axis][i];
+        for (int axis = 0; axis < D; axis++) all.direction[axis][lane] = components[axis][i];
         lanes[i] = lane;
     }
     for (int axis = 0; axis < D; axis++) {
@@ -211,9 +213,7 @@ __kernel void occluded_sets(MESH, uint empty, RAYS, ulong count, __global uchar 
         }
     }
     for (uint lane = 0; lane < own; lane++) {
-        float4 w = (float4)(
-            all.direction[0][lane], all.direction[1][lane], all.direction[2][lane], D == 4 ? all.direction[D - 1][lane] : 0.0f);
-        uint found = hidden_by_star(point, w, star);
+        uint found = hidden_by_star(point, direction_of(&all, lane), star);
         hit |= (ulong)(found == HIT) << lane;
         unsure |= (ulong)(found == UNSURE) << lane;
     }

@@ -8,6 +8,7 @@
 
 use rayon::prelude::*;
 
+use super::lines::WIDTH;
 use super::node::Node;
 use crate::geometry::{Aabb, Vector};
 
@@ -15,6 +16,9 @@ use crate::geometry::{Aabb, Vector};
 const BINS: usize = 16;
 /// Leaves hold at most this many boxes.
 const LEAF: usize = 4;
+/// Sets of more boxes than one of the leaves of eight that [`super::WideBvh`] makes, and of up to this many, are split by how many such leaves
+/// the sides will fill: an eighth simplex costs a leaf nothing.
+const COUNTED_BY_LEAVES: usize = 64;
 /// What it costs to go through a node, in tests of what a leaf holds.
 const NODE_COST: f32 = 1.0;
 /// Below this depth splits halve the count.
@@ -63,9 +67,11 @@ impl<const D: usize> Bin<D> {
         self.count += other.count;
     }
 
+    /// Tests are made `together` at a time.
     #[inline(always)]
-    fn cost(&self, block: u32) -> f32 {
-        if self.count == 0 { 0.0 } else { self.bounds.half_surface() * (self.count.div_ceil(block) * block) as f32 }
+    fn cost(&self, together: u32) -> f32 {
+        let tests = self.count.next_multiple_of(together);
+        if tests == 0 { 0.0 } else { self.bounds.half_surface() * tests as f32 }
     }
 }
 
@@ -235,7 +241,8 @@ impl<const D: usize> Binning<D> {
     /// The cheapest of all splits between bins, over all axes; none if all centres coincide.
     fn best_split(&self, bins: &Bins<D>, items: usize) -> Option<Split<D>> {
         let mut best: Option<Split<D>> = None;
-        let block = if (9..=64).contains(&items) { 8 } else { 1 };
+        let is_counted_by_leaves = items > WIDTH && items <= COUNTED_BY_LEAVES;
+        let together = if is_counted_by_leaves { WIDTH as u32 } else { 1 };
         for (axis, bins) in bins.iter().enumerate().filter(|(axis, _)| self.factor[*axis] > 0.0) {
             let mut rights = [Bin::empty(); BINS];
             let mut right = Bin::empty();
@@ -246,7 +253,7 @@ impl<const D: usize> Binning<D> {
             let mut left = Bin::empty();
             for bin in 0..self.count - 1 {
                 left.join(&bins[bin]);
-                let cost = left.cost(block) + rights[bin + 1].cost(block);
+                let cost = left.cost(together) + rights[bin + 1].cost(together);
                 if left.count > 0 && (left.count as usize) < items && best.is_none_or(|b| cost < b.cost) {
                     best = Some(Split { axis, bin, cost, sides: [left.bounds, rights[bin + 1].bounds] });
                 }

@@ -10,6 +10,7 @@ use super::backend::OpenClBackend;
 use super::bits::Bits;
 use super::device::Argument;
 use super::layout::{self, Float4, StarCone};
+use super::program::SET;
 use super::scene::{MOST_RAYS, OnDevice, Part, float4, is_exact, sampled_point};
 use crate::geometry::{Cone, Dimension, Frame, Vector, widen};
 use crate::progress::{Cancelled, Progress};
@@ -28,8 +29,6 @@ const FEW_RAYS: usize = 1 << 19;
 
 /// Points that one thread prepares at a time.
 const BLOCK: usize = 512;
-/// Rays that a work-item takes, where it takes a set of a point's.
-const SET: usize = 64;
 
 /// A point with what its rays need.
 struct Prepared {

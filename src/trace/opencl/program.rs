@@ -19,6 +19,9 @@ const KERNELS: [&str; 6] = ["layout", "directions", "occluded", "occluded_again"
 /// Work-items of a group. Always the same, as some compilers make a kernel anew for each number.
 pub(super) const GROUP: usize = 64;
 
+/// Rays that a work-item takes, where it takes a set of a point's: as many as a `ulong` has bits.
+pub(super) const SET: usize = 64;
+
 /// What the kernels are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Shape {
@@ -48,7 +51,7 @@ pub(super) fn text(shape: Shape, double: bool) -> String {
         text += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n#define DOUBLE\n";
     }
     if shape.sets {
-        text += "#define SETS\n";
+        text += &format!("#define SETS\n#define SET {SET}\n");
     }
     text += LAYOUT;
     text += SAMPLING;
