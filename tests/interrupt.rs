@@ -37,21 +37,41 @@ fn cpu_seconds() -> f64 {
     (t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64) / rayon::current_num_threads() as f64
 }
 
-/// Seconds from the wish to stop, uttered a while after the start, to the end.
-fn stops<const D: usize>(what: &str, estimator: Estimator, backend: &dyn RayBackend<D>, points: &[ShadingPoint<D>]) {
-    backend.tracer().prepare_wide();
+/// Wishes to stop a while after the start; tells the seconds from there to the end, and none if there was nothing to stop any more.
+fn stopped<const D: usize>(
+    wait: Duration,
+    estimator: Estimator,
+    backend: &dyn RayBackend<D>,
+    points: &[ShadingPoint<D>],
+) -> Option<f64> {
     let watch = Watch(AtomicBool::new(false));
     let (found, seconds) = std::thread::scope(|scope| {
         let work = scope.spawn(|| estimator.estimate(backend, points, None, &watch));
-        std::thread::sleep(Duration::from_millis(300));
-        assert!(!work.is_finished(), "{D}D, {what}, {estimator:?}: it ended too early to be interrupted");
+        std::thread::sleep(wait);
         let wished = cpu_seconds();
         watch.0.store(true, Ordering::Relaxed);
         let found = work.join().unwrap();
         (found, cpu_seconds() - wished)
     });
-    println!("{D}D, {what}, {estimator:?}: {seconds:.3} s");
-    assert_eq!(found, Err(Error::Cancelled), "{D}D, {what}, {estimator:?}");
+    match found {
+        Ok(_) => None,
+        Err(error) => {
+            assert_eq!(error, Error::Cancelled, "{D}D, {estimator:?}");
+            Some(seconds)
+        }
+    }
+}
+
+/// The wish to stop is heard within a second. How long the work would take depends on the machine, so the wish comes sooner where the
+/// work was done before it.
+fn stops<const D: usize>(what: &str, estimator: Estimator, backend: &dyn RayBackend<D>, points: &[ShadingPoint<D>]) {
+    backend.tracer().prepare_wide();
+    let waits = [300, 100, 30, 10, 3, 1].map(Duration::from_millis);
+    let stopped = waits.iter().find_map(|&wait| Some((wait, stopped(wait, estimator, backend, points)?)));
+    let Some((wait, seconds)) = stopped else {
+        panic!("{D}D, {what}, {estimator:?}: it takes less than a millisecond, or does not hear the wish to stop");
+    };
+    println!("{D}D, {what}, {estimator:?}: {seconds:.3} s, after {wait:?}");
     assert!(seconds < 1.0, "{D}D, {what}, {estimator:?}: it took {seconds} s to stop");
 }
 
