@@ -6,17 +6,29 @@
    the D factors of each of D! products, their multiplications and their sum, and of the bound itself. */
 
 #define HALF_ULPS 40
-#define DOUBLE_HALF_ULP 1.1102230246251565e-16
 
-double size(double4 v) {
+/* The most exact numbers that the device has. */
+#ifdef DOUBLE
+typedef double real;
+typedef double4 real4;
+#define REAL4(v) convert_double4(v)
+#define REAL_HALF_ULP 1.1102230246251565e-16
+#else
+typedef float real;
+typedef float4 real4;
+#define REAL4(v) (v)
+#define REAL_HALF_ULP HALF_ULP
+#endif
+
+real size(real4 v) {
     return fabs(v.x) + fabs(v.y) + fabs(v.z) + fabs(v.w);
 }
 
 #if D == 4
-double4 cross_(double4 a, double4 b, double4 c) {
-    double xy = b.x * c.y - b.y * c.x, xz = b.x * c.z - b.z * c.x, xw = b.x * c.w - b.w * c.x;
-    double yz = b.y * c.z - b.z * c.y, yw = b.y * c.w - b.w * c.y, zw = b.z * c.w - b.w * c.z;
-    double4 n;
+real4 cross_(real4 a, real4 b, real4 c) {
+    real xy = b.x * c.y - b.y * c.x, xz = b.x * c.z - b.z * c.x, xw = b.x * c.w - b.w * c.x;
+    real yz = b.y * c.z - b.z * c.y, yw = b.y * c.w - b.w * c.y, zw = b.z * c.w - b.w * c.z;
+    real4 n;
     n.x = a.y * zw - a.z * yw + a.w * yz;
     n.y = -(a.x * zw - a.z * xw + a.w * xz);
     n.z = a.x * yw - a.y * xw + a.w * xy;
@@ -24,8 +36,8 @@ double4 cross_(double4 a, double4 b, double4 c) {
     return n;
 }
 #else
-double4 cross_(double4 a, double4 b) {
-    double4 n;
+real4 cross_(real4 a, real4 b) {
+    real4 n;
     n.x = a.y * b.z - a.z * b.y;
     n.y = a.z * b.x - a.x * b.z;
     n.z = a.x * b.y - a.y * b.x;
@@ -34,14 +46,15 @@ double4 cross_(double4 a, double4 b) {
 }
 #endif
 
-double dot_(double4 a, double4 b) {
+real dot_(real4 a, real4 b) {
     return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w;
 }
 
+#ifdef DOUBLE
 /* HIT, OPEN or UNSURE. If HIT, *t is the distance and *t_error bounds its rounding. */
 uint meets(float4 position, float4 direction, __global const float4 *corners, double *t, double *t_error) {
     const double tiny = 1e-30;
-    const double rounding = HALF_ULPS * DOUBLE_HALF_ULP;
+    const double rounding = HALF_ULPS * REAL_HALF_ULP;
     double4 p = convert_double4(position), w = convert_double4(direction);
     double4 v0 = convert_double4(corners[0]), v1 = convert_double4(corners[1]), v2 = convert_double4(corners[2]);
     double4 e0 = v0 - p, e1 = v1 - p, d1 = v1 - v0, d2 = v2 - v0, g2 = v2 - v1;
@@ -93,6 +106,7 @@ uint meets(float4 position, float4 direction, __global const float4 *corners, do
     if (-oriented > determinant_bound) return OPEN;
     if (!(oriented > determinant_bound) || above + below < D) return UNSURE;
     *t = oriented / sum;
-    *t_error = 4 * *t * (sum_bound / sum + determinant_bound / oriented + 4 * DOUBLE_HALF_ULP);
+    *t_error = 4 * *t * (sum_bound / sum + determinant_bound / oriented + 4 * REAL_HALF_ULP);
     return HIT;
 }
+#endif

@@ -1,17 +1,13 @@
 /* What host and device share. src/trace/opencl/layout.rs has the same structs, and asks `layout` below whether it
    is so. Coordinates are those of the mesh times a power of two that makes the scene about 1 wide. In 3D w is 0. */
 
-/* Up to eight boxes, of children that are nodes and then of those that are leaves. On each axis a box goes from origin + low *
-   2^(exponent - 127) to origin + high * 2^(exponent - 127), one byte each for low, high and exponent. */
+/* What is in the up to eight boxes of a node: children that are nodes, and then leaves. */
 typedef struct {
-    float4 origin;
-    uint exponents;  /* of the axes, the first in the lowest byte */
-    uint children;   /* the first child that is a node; the others follow it */
-    uint simplices;  /* the first simplex of the leaves */
-    uint counts;     /* in the lowest byte how many children are nodes, in the next how many children there are */
-    uint4 sides[4];  /* of each axis, a byte a child: low in the first eight, high in the others */
-    uint2 leaves;    /* a byte a child; of a leaf 8 * (its first simplex, counted from `simplices`) + how many it has */
-    uint padding[2];
+    uint children;  /* the first child that is a node; the others follow it */
+    uint simplices; /* the first simplex of the leaves */
+    uint2 leaves;   /* a byte a child; of a leaf 8 * (its first simplex, counted from `simplices`) + how many it has */
+    uint inner;     /* how many children are nodes */
+    uint padding;
 } Node;
 
 typedef struct {
@@ -21,17 +17,27 @@ typedef struct {
     float factor;    /* of the reflection */
     uint turned;     /* whether its sign is */
     uint ignored;    /* the simplex that rays don't hit, or NONE */
-    uint star_first; /* the cones that the simplices around it hide */
-    uint star_count;
+    uint star;       /* where it is told what the simplices around it hide, or NONE */
     uint next;       /* the first ray's place in its sequence */
     uint vertex;     /* the vertex in this place, or NONE */
-    float star_height; /* above which, over the tangent hyperplane, nothing is hidden by them */
+    uint padding[2];
 } Point;
 
+/* A cone that a simplex around a point hides; or the head of a point's cones, which tells in `normals[0]` how many there are, as an
+   integer's bits, and the height over the tangent hyperplane above which they hide nothing. */
 typedef struct {
     float4 normals[4]; /* inward, of length about 1 */
     float4 bounds;     /* on the rounding of their products with a direction */
 } StarCone;
+
+/* A vertex whose cones are asked for. */
+typedef struct {
+    float4 position;
+    float4 normal;
+    uint vertex; /* as in Point */
+    uint star;   /* where the head goes */
+    uint padding[2];
+} Apex;
 
 #define NONE 0xffffffffu
 
@@ -45,13 +51,16 @@ __kernel void layout(__global uint *sizes) {
     Node node;
     Point point;
     StarCone cone;
+    Apex apex;
     sizes[0] = sizeof(Node);
     sizes[1] = (uint)((uintptr_t)&node.leaves - (uintptr_t)&node);
-    sizes[2] = (uint)((uintptr_t)&node.sides - (uintptr_t)&node);
+    sizes[2] = (uint)((uintptr_t)&node.inner - (uintptr_t)&node);
     sizes[3] = sizeof(Point);
     sizes[4] = (uint)((uintptr_t)&point.keys - (uintptr_t)&point);
     sizes[5] = (uint)((uintptr_t)&point.factor - (uintptr_t)&point);
     sizes[6] = (uint)((uintptr_t)&point.next - (uintptr_t)&point);
     sizes[7] = sizeof(StarCone);
     sizes[8] = (uint)((uintptr_t)&cone.bounds - (uintptr_t)&cone);
+    sizes[9] = sizeof(Apex);
+    sizes[10] = (uint)((uintptr_t)&apex.vertex - (uintptr_t)&apex);
 }

@@ -31,13 +31,12 @@ uint scramble(uint x, uint key) {
     return x;
 }
 
-uint sobol(uint index, uint dimension, __global const uint *matrices) {
+/* A coordinate of a point. Of the second and third dimension's matrices the host tells what the columns of each byte of an index add up
+   to, 256 sums a byte. */
+uint sobol(uint index, uint dimension, __global const uint *sums) {
     if (dimension == 0) return reversed(index);
-    uint x = 0;
-    __global const uint *matrix = matrices + 32 * (dimension - 1);
-    for (uint bit = 0; index != 0; bit++, index >>= 1)
-        if (index & 1u) x ^= matrix[bit];
-    return x;
+    __global const uint *of = sums + 1024 * (dimension - 1);
+    return of[index & 0xffu] ^ of[256 + (index >> 8 & 0xffu)] ^ of[512 + (index >> 16 & 0xffu)] ^ of[768 + (index >> 24)];
 }
 
 float unit(uint bits) {
@@ -82,14 +81,14 @@ float4 cube_to_ball(float a, float b, float c) {
 }
 
 /* Ray number `next` of a point. */
-float4 sampled(Point point, uint next, __global const uint *matrices) {
+float4 sampled(Point point, uint next, __global const uint *sums) {
     uint index = scramble(next, point.keys.w);
-    float a = unit(scramble(sobol(index, 0, matrices), point.keys.x));
-    float b = unit(scramble(sobol(index, 1, matrices), point.keys.y));
+    float a = unit(scramble(sobol(index, 0, sums), point.keys.x));
+    float b = unit(scramble(sobol(index, 1, sums), point.keys.y));
     float4 local_;
     float square;
 #if D == 4
-    float c = unit(scramble(sobol(index, 2, matrices), point.keys.z));
+    float c = unit(scramble(sobol(index, 2, sums), point.keys.z));
     local_ = cube_to_ball(a, b, c);
     square = local_.x * local_.x + local_.y * local_.y;
     square = square + local_.z * local_.z;
@@ -114,23 +113,23 @@ float4 sampled(Point point, uint next, __global const uint *matrices) {
 /* The same for eight rays, from number `next` on, which is a multiple of 8; without branches. Coordinates of points are never zero. */
 
 /* A coordinate of the points, of whose indices all bits but the lowest three are those of `base`. */
-float8 coordinate_of_8(uint8 index, uint base, uint dimension, uint key, __global const uint *matrices) {
-    uint8 x = (uint8)(sobol(base, dimension, matrices));
+float8 coordinate_of_8(uint8 index, uint base, uint dimension, uint key, __global const uint *sums) {
+    uint8 x = (uint8)(sobol(base, dimension, sums));
     if (dimension == 0)
         x |= (index & 1u) << 31 | (index & 2u) << 29 | (index & 4u) << 27;
     else
-        for (uint bit = 0; bit < 3; bit++) x ^= (0u - (index >> bit & 1u)) & matrices[32 * (dimension - 1) + bit];
+        for (uint bit = 0; bit < 3; bit++) x ^= (0u - (index >> bit & 1u)) & sums[1024 * (dimension - 1) + (1u << bit)];
     SCRAMBLE(x, key)
     return (convert_float8(as_int8(x >> 8)) + 0.5f) * (1.0f / 8388608.0f) - 1.0f;
 }
 
-void sampled_8(Point point, uint next, __global const uint *matrices, float8 *out) {
+void sampled_8(Point point, uint next, __global const uint *sums, float8 *out) {
     uint8 index = next + (uint8)(0, 1, 2, 3, 4, 5, 6, 7);
     uint key = point.keys.w;
     SCRAMBLE(index, key)
     uint base = index.s0 & ~7u;
-    float8 a = coordinate_of_8(index, base, 0, point.keys.x, matrices);
-    float8 b = coordinate_of_8(index, base, 1, point.keys.y, matrices);
+    float8 a = coordinate_of_8(index, base, 0, point.keys.x, sums);
+    float8 b = coordinate_of_8(index, base, 1, point.keys.y, sums);
     int8 first = fabs(a) > fabs(b);
     float8 large = select(b, a, first), small = select(a, b, first);
     float8 angle = small / large * 0.785398163397448309615660845819875721f, z = angle * angle;
@@ -142,7 +141,7 @@ void sampled_8(Point point, uint next, __global const uint *matrices, float8 *ou
     locals[0] = select(v, u, first);
     locals[1] = select(u, v, first);
 #if D == 4
-    float8 c = coordinate_of_8(index, base, 2, point.keys.z, matrices);
+    float8 c = coordinate_of_8(index, base, 2, point.keys.z, sums);
     float8 radius = max(fabs(a), fabs(b)), shell = max(radius, fabs(c)), r = radius / shell;
     float8 cap = copysign(1.0f - r * r * (1.0f / 3.0f), c), wall = c / shell * (2.0f / 3.0f);
     float8 height = select(wall, cap, (int8)(fabs(c) >= radius));
@@ -171,17 +170,17 @@ void sampled_8(Point point, uint next, __global const uint *matrices, float8 *ou
 #endif
 
 /* Directions alone, to see whether this device makes the right ones. */
-__kernel void directions(__global const Point *points, __global const uint *matrices, uint rays, __global float4 *out) {
+__kernel void directions(__global const Point *points, __global const uint *sums, uint rays, __global float4 *out) {
     size_t i = get_global_id(0);
     Point point = points[i / rays];
 #ifdef SETS
     float8 eight[4];
     eight[3] = (float8)(0.0f);
-    sampled_8(point, point.next + (uint)(i % rays & ~7u), matrices, eight);
+    sampled_8(point, point.next + (uint)(i % rays & ~7u), sums, eight);
     float lanes[4][8];
     for (int k = 0; k < 4; k++) vstore8(eight[k], 0, lanes[k]);
     out[i] = (float4)(lanes[0][i % 8], lanes[1][i % 8], lanes[2][i % 8], lanes[3][i % 8]);
 #else
-    out[i] = sampled(point, point.next + (uint)(i % rays), matrices);
+    out[i] = sampled(point, point.next + (uint)(i % rays), sums);
 #endif
 }

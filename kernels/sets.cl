@@ -83,14 +83,14 @@ ulong crossed_by(float4 position, const Rays *rays, __global const float4 *facet
     { \
         float inverse = rays->inverse[axis][i]; \
         bool is_negative = inverse < 0.0f; \
-        enter = max(enter, sides[axis][is_negative] * inverse); \
-        leave = min(leave, sides[axis][!is_negative] * inverse); \
+        enter = max(enter, seen[axis][is_negative] * inverse); \
+        leave = min(leave, seen[axis][!is_negative] * inverse); \
     }
 
 /* Which rays of the set something blocks, and which perhaps. */
 ulong blocked_of(MESH, Point point, const Rays *rays, ulong set, float limit, ulong *unsure) {
-    float4 position = point.position;
-    const float p[4] = {position.x, position.y, position.z, position.w};
+    float4 position = point.position, to_middle = *middle - position;
+    const float way[4] = {to_middle.x, to_middle.y, to_middle.z, to_middle.w};
     ulong open = set, sets[7 * DEPTH + 8];
     uint stack[7 * DEPTH + 8], depth = 1;
     sets[0] = set;
@@ -100,19 +100,11 @@ ulong blocked_of(MESH, Point point, const Rays *rays, ulong set, float limit, ul
         set = sets[--depth] & open;
         if (set == 0) continue;
         __global const Node *node = nodes + stack[depth];
-        float4 origin = node->origin;
-        const float from[4] = {origin.x, origin.y, origin.z, origin.w};
-        uint exponents = node->exponents;
-        /* The sides of the boxes as seen from the point, first those that a ray with a positive component meets first. They are pulled apart
-           by more than the rounding of both sums; the comparison allows for that of reciprocals and products. */
-        float8 sides[D][2];
-        for (int axis = 0; axis < D; axis++) {
-            float step = as_float((exponents >> 8 * axis & 0xffu) << 23), start = from[axis] - p[axis];
-            float slack = (fabs(start) + 256.0f * step) * 1e-6f;
-            uint4 steps = node->sides[axis];
-            sides[axis][0] = convert_float8(as_uchar8(steps.xy)) * step + (start - slack);
-            sides[axis][1] = convert_float8(as_uchar8(steps.zw)) * step + (start + slack);
-        }
+        __global const float *from = (__global const float *)(sides + 4 * D * stack[depth]);
+        /* The sides of the boxes as seen from the point, first those that a ray with a positive component meets first. */
+        float8 seen[D][2];
+        for (int axis = 0; axis < D; axis++)
+            for (int end = 0; end < 2; end++) seen[axis][end] = vload8(2 * axis + end, from) + way[axis];
         ulong8 met_by = (ulong8)(0);
         for (ulong rest = set; rest != 0; rest = WITHOUT_LOWEST(rest)) {
             ulong bit = rest & (0ul - rest);
@@ -122,14 +114,13 @@ ulong blocked_of(MESH, Point point, const Rays *rays, ulong set, float limit, ul
             ALONG(1)
             ALONG(2)
             ALONG(D - 1)
-            int8 met = enter * (1.0f - 2e-6f) <= leave * (1.0f + 2e-6f);
-            met_by |= as_ulong8(convert_long8(met)) & bit;
+            met_by |= as_ulong8(convert_long8(enter <= leave)) & bit;
         }
         ulong of[8];
         vstore8(met_by, 0, of);
-        uint counts = node->counts, inner = counts & 0xffu, children = counts >> 8 & 0xffu;
+        uint inner = node->inner;
         uint2 bytes = node->leaves;
-        for (uint child = inner; child < children; child++) {
+        for (uint child = inner; child < 8; child++) {
             uint byte = (child < 4 ? bytes.x : bytes.y) >> 8 * (child & 3u) & 0xffu;
             uint first = node->simplices + (byte >> 3), end = first + (byte & 7u);
             ulong left = of[child] & open;
@@ -144,8 +135,7 @@ ulong blocked_of(MESH, Point point, const Rays *rays, ulong set, float limit, ul
                 for (; doubt != 0; doubt = WITHOUT_LOWEST(doubt)) {
                     ulong bit = doubt & (0ul - doubt);
                     uint i = 63u - (uint)clz(bit);
-                    float t, t_error;
-                    uint one = met(position, direction_of(rays, i), FACET_OF(k), CORNERS(k), limit, false, &t, &t_error);
+                    uint one = met_before(position, direction_of(rays, i), FACET_OF(k), CORNERS(k), limit, false);
                     if (one == HIT) hit |= bit;
                     if (one == UNSURE) *unsure |= bit;
                 }
@@ -179,7 +169,7 @@ __kernel void occluded_sets(MESH, uint empty, RAYS, ulong count, __global uchar 
     } else {
         for (uint i = 0; i < own; i += LANES) {
             float8 eight[4];
-            sampled_8(point, point.next + first + i, matrices, eight);
+            sampled_8(point, point.next + first + i, sums, eight);
             for (int axis = 0; axis < D; axis++) vstore8(eight[axis], i / LANES, components[axis]);
         }
     }

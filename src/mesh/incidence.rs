@@ -36,6 +36,16 @@ impl Incidence {
         Self { starts, simplices }
     }
 
+    /// The simplices around all points, one point's after the other's.
+    pub fn simplices(&self) -> &[u32] {
+        &self.simplices
+    }
+
+    /// Where those of each identity begin in [`Self::simplices`], and where the last ones end.
+    pub fn starts(&self) -> &[u32] {
+        &self.starts
+    }
+
     /// The simplices around the point whose identity is `identity`.
     pub fn around(&self, identity: u32) -> &[u32] {
         let i = identity as usize;

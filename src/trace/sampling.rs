@@ -189,9 +189,26 @@ pub(crate) fn scramble_reversed(x: u32, key: u32) -> u32 {
 /// Direction numbers of the second and third Sobol' dimension (Joe and Kuo 2008); the first is the reversed index.
 const SOBOL: [[u32; 32]; 2] = [sobol_matrix(1, 0, &[1]), sobol_matrix(2, 1, &[1, 3])];
 
-/// The direction numbers of the second and third dimension, one after the other.
-pub(crate) fn sobol_matrices() -> Vec<u32> {
-    SOBOL.concat()
+/// The first so many Sobol' points, in the order of a Z curve: by the highest bits of all their coordinates, then the next.
+pub(crate) fn along_curve(count: u32, dimension: Dimension) -> Vec<u32> {
+    let coordinates = dimension.pick(2, 3);
+    let place = |&index: &u32| {
+        let point: [u32; 3] = std::array::from_fn(|d| sobol(index, d));
+        let bits = (0..10).flat_map(|level| (0..coordinates).map(move |d| point[d] >> (31 - level) & 1));
+        bits.fold(0u32, |place, bit| place << 1 | bit)
+    };
+    let mut order: Vec<u32> = (0..count).collect();
+    order.sort_by_cached_key(place);
+    order
+}
+
+/// The sums of the columns of the second dimension's matrix, and then of the third's, over the bits of a byte of the index: 256 for
+/// its lowest byte, then for the others.
+pub(crate) fn sobol_sums() -> Vec<u32> {
+    let sum = |columns: &[u32], byte: u32| {
+        (0..8).filter(|bit| byte >> bit & 1 == 1).fold(0, |sum, bit| sum ^ columns[bit as usize])
+    };
+    SOBOL.iter().flat_map(|matrix| matrix.chunks(8)).flat_map(|c| (0..256).map(move |byte| sum(c, byte))).collect()
 }
 
 /// Direction numbers from a primitive polynomial of degree `s` with inner coefficients `a`, and initial values `m`.

@@ -32,27 +32,16 @@ pub(super) fn star_cone<const D: usize>(
     rises.then(|| Cone::new(columns))
 }
 
-/// What the star of a vertex hides.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Star<const D: usize> {
-    /// The cones, each with its simplex.
-    pub cones: Vec<(u32, Cone<D>)>,
-    /// Whether the vertex is approached from straight above, along its normal.
-    pub straight: bool,
-}
-
-impl<const D: usize> Star<D> {
-    /// Of a point that is no vertex there is none.
-    pub fn of(tracer: &Tracer<D>, point: &ShadingPoint<D>) -> Self {
-        let ShadingPoint::Vertex(vertex) = *point else { return Self { cones: Vec::new(), straight: true } };
-        let mesh = tracer.mesh();
-        let (position, normal) = (mesh.vertices[vertex as usize], mesh.normals[vertex as usize]);
-        let identity = mesh.identity[vertex as usize];
-        let around = tracer.incidence().around(identity);
-        let ways = [normal, approach(mesh, around, vertex)];
-        let cone = |&simplex: &u32| Some((simplex, star_cone(mesh, position, ways, identity, simplex)?));
-        Self { cones: around.iter().filter_map(cone).collect(), straight: ways[0] == ways[1] }
-    }
+/// What the simplices around a vertex hide: a cone each, with the simplex. Of a point that is no vertex there is none.
+pub(super) fn star<const D: usize>(tracer: &Tracer<D>, point: &ShadingPoint<D>) -> Vec<(u32, Cone<D>)> {
+    let ShadingPoint::Vertex(vertex) = *point else { return Vec::new() };
+    let mesh = tracer.mesh();
+    let (position, normal) = (mesh.vertices[vertex as usize], mesh.normals[vertex as usize]);
+    let identity = mesh.identity[vertex as usize];
+    let around = tracer.incidence().around(identity);
+    let ways = [normal, approach(mesh, around, vertex)];
+    let cone = |&simplex: &u32| Some((simplex, star_cone(mesh, position, ways, identity, simplex)?));
+    around.iter().filter_map(cone).collect()
 }
 
 /// What a ray meets, and where on it, in barycentric coordinates.
@@ -82,7 +71,7 @@ impl<const D: usize> Surroundings<D> {
         Self {
             position: point.position(mesh),
             normal: point.normal(mesh),
-            star: Star::of(tracer, point).cones,
+            star: star(tracer, point),
             ignored: point.ignored(tracer),
         }
     }

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::device::Argument;
 use super::error::Error;
-use super::layout::{self, Float4};
+use super::layout::{self, Float4, float4};
 use super::open::OpenCl;
-use super::scene::{Part, Scene, Tuning, float4, is_exact};
+use super::scene::{Part, Scene, Tuning, is_exact};
 use crate::accel::{Scale, Tracer};
 use crate::geometry::{Cone, Ray};
 use crate::progress::{Cancelled, Progress};

@@ -16,7 +16,7 @@ use opencl3::context::Context;
 use opencl3::error_codes::ClError;
 use opencl3::event::Event;
 use opencl3::kernel::Kernel;
-use opencl3::memory::{Buffer, CL_MEM_READ_ONLY, CL_MEM_READ_WRITE, ClMem};
+use opencl3::memory::{Buffer, CL_MEM_READ_WRITE, ClMem};
 use opencl3::program::Program;
 use opencl3::types::{CL_TRUE, cl_device_id, cl_mem};
 
@@ -42,6 +42,8 @@ pub(super) struct Kernels {
     program: Arc<Program>,
     pub layout: Kernel,
     pub directions: Kernel,
+    pub stars: Kernel,
+    pub aimed: Kernel,
     pub occluded: Kernel,
     pub occluded_again: Kernel,
     /// Instead of `occluded`, for sets of rays, if that is what the program is made for.
@@ -56,6 +58,8 @@ impl Kernels {
         Ok(Self {
             layout: kernel("layout")?,
             directions: kernel("directions")?,
+            stars: kernel("stars")?,
+            aimed: kernel("aimed")?,
             occluded: kernel("occluded")?,
             occluded_again: kernel("occluded_again")?,
             occluded_sets: if sets { Some(kernel("occluded_sets")?) } else { None },
@@ -77,15 +81,6 @@ pub(super) struct Memory<T> {
 
 /// Memory that is used again for as long as it has room.
 pub(super) type Kept<T> = Option<Memory<T>>;
-
-/// What the kernels do with memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Role {
-    /// They read it.
-    Input,
-    /// They write it, and other kernels may read it.
-    Output,
-}
 
 /// An argument of a kernel.
 pub(super) enum Argument<'a> {
@@ -172,38 +167,22 @@ impl Device {
             .map_err(|(_, error)| self.failed("making a kernel")(error))
     }
 
-    /// Memory for so many results of a kernel, at least one.
-    pub fn output<T: Pod>(&self, room: usize, what: &'static str) -> Result<Memory<T>, Error> {
-        self.allocate(room, Role::Output, what)
-    }
-
-    /// Memory that holds these values for kernels to read.
+    /// Memory that holds these values.
     pub fn input<T: Pod>(&self, values: &[T], what: &'static str) -> Result<Memory<T>, Error> {
-        let mut memory = self.allocate(values.len(), Role::Input, what)?;
+        let mut memory = self.output(values.len(), what)?;
         self.write(&mut memory, 0, values)?;
         Ok(memory)
     }
 
-    /// As [`Self::output`], kept.
+    /// As [`Self::output`], kept; what was there may be lost.
     pub fn room<'m, T: Pod>(
-        &self,
-        kept: &'m mut Kept<T>,
-        room: usize,
-        what: &'static str,
-    ) -> Result<&'m Memory<T>, Error> {
-        let found = kept.take().filter(|memory| memory.room >= room);
-        Ok(kept.insert(found.map_or_else(|| self.output(room, what), Ok)?))
-    }
-
-    /// Memory to write so many values to, for kernels to read; what was there may be lost.
-    pub fn room_for_input<'m, T: Pod>(
         &self,
         kept: &'m mut Kept<T>,
         room: usize,
         what: &'static str,
     ) -> Result<&'m mut Memory<T>, Error> {
         let found = kept.take().filter(|memory| memory.room >= room);
-        Ok(kept.insert(found.map_or_else(|| self.allocate(room, Role::Input, what), Ok)?))
+        Ok(kept.insert(found.map_or_else(|| self.output(room, what), Ok)?))
     }
 
     /// As [`Self::input`], kept.
@@ -213,24 +192,21 @@ impl Device {
         values: &[T],
         what: &'static str,
     ) -> Result<&'m Memory<T>, Error> {
-        let memory = self.room_for_input(kept, values.len(), what)?;
+        let memory = self.room(kept, values.len(), what)?;
         self.write(memory, 0, values)?;
         Ok(memory)
     }
 
     /// Memory with room for so many values, at least one.
-    fn allocate<T: Pod>(&self, room: usize, role: Role, what: &'static str) -> Result<Memory<T>, Error> {
+    pub fn output<T: Pod>(&self, room: usize, what: &'static str) -> Result<Memory<T>, Error> {
         let bytes = room.max(1) * size_of::<T>();
         if self.info.largest > 0 && bytes as u64 > self.info.largest {
             let (needed, limit) = (bytes as u64, self.info.largest);
             return Err(Error::TooLarge { device: self.info.label(), what, needed, limit });
         }
-        let flags = match role {
-            Role::Input => CL_MEM_READ_ONLY,
-            Role::Output => CL_MEM_READ_WRITE,
-        };
         // SAFETY: no host memory is handed over.
-        let buffer = unsafe { Buffer::<u8>::create(&self.context, flags, bytes, ptr::null_mut::<c_void>()) };
+        let buffer =
+            unsafe { Buffer::<u8>::create(&self.context, CL_MEM_READ_WRITE, bytes, ptr::null_mut::<c_void>()) };
         let buffer = buffer.map_err(self.failed("asking for memory"))?;
         Ok(Memory { buffer, room: room.max(1), values: PhantomData })
     }

@@ -12,7 +12,9 @@
 //! - `wide`, `facet`: the hierarchy and the simplices as devices want them;
 //! - `scene`: the mesh on devices, and who does what of the work;
 //! - [`OpenClBackend`]: a mesh with its hierarchy on devices;
-//! - `points`, `bits`: shading points, in batches short enough for watchdogs and for whoever wants to stop.
+//! - `points`: shading points, in batches short enough for watchdogs and for whoever wants to stop;
+//! - `stars`: what the simplices around them hide; `order`: which of their rays go side by side; `launch`, `bits`: a batch of
+//!   rays, and what becomes of them.
 //!
 //! libOpenCL is opened at run time; nothing of it is needed to build, or to run without it.
 
@@ -22,11 +24,14 @@ mod device;
 mod devices;
 mod error;
 mod facet;
+mod launch;
 mod layout;
 mod open;
+mod order;
 mod points;
 mod program;
 mod scene;
+mod stars;
 mod wide;
 
 pub use backend::OpenClBackend;

@@ -7,6 +7,7 @@ const LAYOUT: &str = include_str!("../../../kernels/layout.cl");
 const SAMPLING: &str = include_str!("../../../kernels/sampling.cl");
 const CONE: &str = include_str!("../../../kernels/cone.cl");
 const TRACE: &str = include_str!("../../../kernels/trace.cl");
+const STARS: &str = include_str!("../../../kernels/stars.cl");
 const SETS: &str = include_str!("../../../kernels/sets.cl");
 
 /// The most pieces of memory for corners: a device takes at least a quarter of all it has in one piece.
@@ -14,13 +15,19 @@ pub(super) const PIECES: usize = 4;
 
 /// The kernels of the program.
 #[cfg(test)]
-const KERNELS: [&str; 6] = ["layout", "directions", "occluded", "occluded_again", "packed", "first_hit"];
+const KERNELS: [&str; 8] =
+    ["layout", "directions", "stars", "aimed", "occluded", "occluded_again", "packed", "first_hit"];
 
 /// Work-items of a group. Always the same, as some compilers make a kernel anew for each number.
 pub(super) const GROUP: usize = 64;
 
 /// Rays that a work-item takes, where it takes a set of a point's: as many as a `ulong` has bits.
 pub(super) const SET: usize = 64;
+
+/// Of how many work-items one has a ray, where there are few: those that graphics processors take in step.
+pub(super) fn spread(sets: bool) -> usize {
+    if sets { 1 } else { 32 }
+}
 
 /// What the kernels are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,15 +57,15 @@ pub(super) fn text(shape: Shape, double: bool) -> String {
     if double {
         text += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n#define DOUBLE\n";
     }
+    text += &format!("#define SPREAD {}\n", spread(shape.sets));
     if shape.sets {
         text += &format!("#define SETS\n#define SET {SET}\n");
     }
     text += LAYOUT;
     text += SAMPLING;
-    if double {
-        text += CONE;
-    }
+    text += CONE;
     text += TRACE;
+    text += STARS;
     if shape.sets {
         text += SETS;
     }
@@ -100,7 +107,7 @@ mod tests {
             assert_eq!(text.contains("void occluded_sets("), sets);
             let opened = text.matches("#if").count();
             assert_eq!(opened, text.matches("#endif").count());
-            assert_eq!(text.contains("double4"), double);
+            assert_eq!(text.contains("#define DOUBLE"), double);
         }
         assert_eq!(without_comments("a /* b */ c/**/d\\\ne"), "a   c d e");
     }

@@ -9,14 +9,15 @@ use super::device::{Argument, Device, Kept, Kernels, Memory};
 use super::devices::Kind;
 use super::error::Error;
 use super::facet::{self, facet};
-use super::layout::{self, Float4, StarCone};
+use super::layout::{self, Float4, StarCone, float4};
 use super::open::OpenCl;
+use super::order;
 use super::program::{PIECES, Shape};
 use super::wide::Wide;
 use crate::accel::{Scale, Tracer};
-use crate::geometry::{Frame, Vector};
+use crate::geometry::{Dimension, Frame, Vector};
 use crate::trace::backend::{Error as TraceError, NOTHING};
-use crate::trace::sampling::{Sampler, Sequence, Source, sobol_matrices};
+use crate::trace::sampling::{Sampler, Sequence, Source, sobol_sums};
 
 /// Rays of a launch to begin with.
 const RAYS: usize = 1 << 17;
@@ -70,23 +71,33 @@ pub(super) struct OnDevice {
 #[derive(Debug)]
 pub(super) struct MeshCopy {
     nodes: Memory<layout::Node>,
+    /// The boxes of the nodes, and what their sides are told from.
+    sides: Memory<Float4>,
+    middle: Memory<Float4>,
     /// Of the simplices, piece after piece: what is told of them, and their corners.
     facets: Vec<Memory<Float4>>,
     corners: Vec<Memory<Float4>>,
     simplices: Memory<u32>,
     /// Of each simplex, what vertices with the same coordinates have in common.
     vertices: Memory<[u32; 4]>,
-    pub matrices: Memory<u32>,
-    is_empty: bool,
+    /// The simplices around each vertex, as they are numbered here, and where they begin.
+    pub around: [Memory<u32>; 2],
+    /// What makes Sobol' points, and where the rays of a point go ([`order`]).
+    pub sums: Memory<u32>,
+    pub places: Memory<u16>,
+    pub is_empty: bool,
 }
 
 /// Room for what launches need and find.
 #[derive(Debug, Default)]
 pub(super) struct Room {
     pub points: Kept<layout::Point>,
+    pub apices: Kept<layout::Apex>,
     pub star: Kept<StarCone>,
     pub origins: Kept<Float4>,
+    pub given: Kept<Float4>,
     pub directions: Kept<Float4>,
+    pub numbers: Kept<u32>,
     pub passed: Kept<u32>,
     pub bounds: Kept<[f32; 2]>,
     pub found: Kept<u8>,
@@ -99,7 +110,7 @@ pub(super) struct Room {
 impl MeshCopy {
     /// What kernels are told of the mesh.
     pub fn arguments(&self) -> Vec<Argument<'_>> {
-        let mut arguments = vec![self.nodes.argument()];
+        let mut arguments = vec![self.nodes.argument(), self.sides.argument(), self.middle.argument()];
         for pieces in [&self.facets, &self.corners] {
             // Those that there aren't are never looked at.
             arguments.extend((0..PIECES).map(|piece| pieces[piece.min(pieces.len() - 1)].argument()));
@@ -141,6 +152,10 @@ impl Scene {
             found
         };
         let vertices: Vec<[u32; 4]> = wide.order.par_iter().map(vertices).collect();
+        let incidence = tracer.incidence();
+        let mut place_of = vec![NOTHING; mesh.simplices.len()];
+        wide.order.iter().zip(0..).for_each(|(&simplex, place)| place_of[simplex as usize] = place);
+        let around: Vec<u32> = incidence.simplices().par_iter().map(|&simplex| place_of[simplex as usize]).collect();
         let mut parts = Vec::new();
         for device in &opencl.devices {
             let (is_gpu, is_processor) = (device.info.kind == Kind::Gpu, device.info.kind == Kind::Cpu);
@@ -155,8 +170,8 @@ impl Scene {
                 piece: (!is_whole).then(|| wide.order.len().div_ceil(PIECES).max(1)),
             };
             let kernels = device.build(shape)?;
-            let matrices = device.input(&sobol_matrices(), "tables")?;
-            let makes_directions = makes_directions::<D>(device, &kernels, &matrices)?;
+            let sums = device.input(&sobol_sums(), "tables")?;
+            let makes_directions = makes_directions::<D>(device, &kernels, &sums)?;
             let size = shape.piece.unwrap_or(wide.order.len()).max(1);
             let pieces = |all: &[Float4], vectors: usize, what| {
                 let chunks = if all.is_empty() { vec![all] } else { all.chunks(vectors * size).collect() };
@@ -164,11 +179,15 @@ impl Scene {
             };
             let mesh = Arc::new(MeshCopy {
                 nodes: device.input(&wide.nodes, "the nodes of the hierarchy")?,
+                sides: device.input(&wide.sides, "the boxes of the hierarchy")?,
+                middle: device.input(&[wide.middle], "the boxes of the hierarchy")?,
                 facets: pieces(&facets, facet::vectors::<D>(), "the simplices")?,
                 corners: pieces(&corners, D, "the corners of the simplices")?,
                 simplices: device.input(&wide.order, "the numbers of the simplices")?,
                 vertices: device.input(&vertices, "the vertices of the simplices")?,
-                matrices,
+                around: [device.input(incidence.starts(), "the vertices")?, device.input(&around, "the vertices")?],
+                sums,
+                places: device.input(&order::places(Dimension::of::<D>()), "tables")?,
                 is_empty: wide.nodes.is_empty(),
             });
             let part = |device, kernels| {
@@ -216,13 +235,6 @@ impl Scene {
     }
 }
 
-/// A vector as devices know it.
-pub(super) fn float4<const D: usize>(v: &Vector<D>) -> Float4 {
-    let mut all = [0.0; 4];
-    all[..D].copy_from_slice(v.as_slice());
-    Float4(all)
-}
-
 /// Whether scaling the point loses nothing.
 pub(super) fn is_exact<const D: usize>(scale: &Scale<D>, point: &Vector<D>) -> bool {
     let scaled = scale.scaled(point);
@@ -241,7 +253,7 @@ pub(super) fn sampled_point<const D: usize>(frame: &Frame<D>, sequence: &Sequenc
 }
 
 /// Tries whether the device makes the host's directions, of some thousand rays.
-fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, matrices: &Memory<u32>) -> Result<bool, Error> {
+fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, sums: &Memory<u32>) -> Result<bool, Error> {
     const POINTS: u64 = 64;
     const RAYS: u32 = 128;
     let frame = |point: u64| {
@@ -252,7 +264,7 @@ fn makes_directions<const D: usize>(device: &Device, kernels: &Kernels, matrices
     let points: Vec<layout::Point> = (0..POINTS).map(|point| sampled_point(&frame(point), &sequence(point))).collect();
     let count = (POINTS * u64::from(RAYS)) as usize;
     let (points, out) = (device.input(&points, "points")?, device.output::<Float4>(count, "results")?);
-    let arguments = [points.argument(), matrices.argument(), Argument::U32(RAYS), out.argument()];
+    let arguments = [points.argument(), sums.argument(), Argument::U32(RAYS), out.argument()];
     device.launch(&kernels.directions, &arguments, count)?;
     let mut found = vec![Float4::default(); count];
     device.read(&out, &mut found)?;

@@ -1,21 +1,26 @@
-//! The hierarchy as devices want it: nodes of eight boxes, in a byte for each side of a box.
+//! The hierarchy as devices want it: nodes of eight boxes.
 //!
-//! A node tells eight boxes in 112 bytes, where a binary tree would take 7 nodes of 48 bytes, one after the other; and a ray
+//! A node tells eight boxes where a binary tree would take seven nodes, one after the other; and a ray
 //! keeps what it has to come back to as one number and a bit for each child, so the stack is as short as the hierarchy is
 //! deep (after Ylitie, Karras and Laine, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, HPG 2017). All
-//! eight boxes are one vector of eight numbers, which a processor with AVX has registers for.
+//! eight boxes are one vector of eight numbers, which a processor with AVX has registers for. Their sides are plain numbers: in a byte each
+//! they took less memory, but turning bytes into numbers was what GPUs spent most of their time on.
 //!
-//! A box is rounded outwards to steps of the node's own grid: what `side` makes of them, one exact product and one rounded
-//! sum, holds what it should, with an ulp to spare on each side (`grown`). That is more than the sum's rounding, so the box of the
-//! unrounded sides holds it too, and the device, which makes distances from them in another order, allows for its own rounding.
+//! Sides are told from the middle of the scene, which is about 1 wide, and boxes are larger than what they hold by [`GROWTH`] on each
+//! side. That is more than the rounding of the distances that a device makes of them, so it need not allow for it.
 
-use super::layout::Node;
+use super::layout::{Float4, Node, float4};
 use crate::accel::{Bvh, Scale};
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Vector, narrow, widen};
 
-/// What boxes grow by on each side, in widths of the scene, beside the rounding of that: far more than what
-/// `inverted` of the kernels moves a ray by, and so little that it only matters around 0.
-const GROWTH: f32 = 1e-18;
+/// What boxes grow by on each side, in widths of the scene: 16 u, where u is half an ulp of 1.
+///
+/// Devices take (s - p) / (w l) for the distance of a side s from an origin p, in ways of length l, both at most 1/2 from the middle m:
+/// as s r + (m - p) r, where
+/// r is 1 / w / l. Its rounding is less than if the side were moved by 12.5 u: 10 u |s - p| are those of both divisions, at most 2.5 ulps each as
+/// OpenCL has it, 2 u |m - p| and u |s| those of the difference and the products, and u |s - p| that of the sum. Where a
+/// component of w is next to nothing, `inverted` of the kernels moves the ray by much less.
+const GROWTH: f64 = 1.0 / (1 << 20) as f64;
 /// Children of a node.
 const WIDTH: usize = 8;
 /// The most simplices of a leaf: all leaves of a node together have no more than a byte can tell.
@@ -25,10 +30,19 @@ const MOST: u32 = 4;
 #[derive(Debug, Default)]
 pub(super) struct Wide {
     pub nodes: Vec<Node>,
+    /// Of each node [`sides`] vectors: on each axis where its eight boxes begin, and where they end.
+    pub sides: Vec<Float4>,
+    /// What sides are told from, in scaled coordinates.
+    pub middle: Float4,
     /// The simplices, the leaves of a node after each other.
     pub order: Vec<u32>,
     /// Nodes on the longest way from the root to a leaf.
     pub depth: usize,
+}
+
+/// How many vectors tell the boxes of a node.
+pub(super) const fn sides<const D: usize>() -> usize {
+    4 * D
 }
 
 /// What is below a node of the binary tree, or a part of a leaf of it.
@@ -64,14 +78,15 @@ impl Below {
 }
 
 impl Wide {
-    /// Takes the binary tree's boxes, eight at a time, in scaled coordinates.
+    /// Takes the binary tree's boxes, eight at a time.
     pub fn new<const D: usize>(bvh: &Bvh<D>, scale: &Scale<D>) -> Self {
-        let mut wide = Self { nodes: Vec::new(), order: Vec::with_capacity(bvh.order.len()), depth: 0 };
+        let middle: Vector<D> = narrow(&(scale.centre * scale.factor));
+        let mut wide = Self { middle: float4(&middle), ..Self::default() };
         if bvh.nodes.is_empty() {
             return wide;
         }
         let area = |below: &Below| bvh.nodes[below.node].bounds.half_surface();
-        wide.nodes.push(Node::default());
+        wide.add::<D>();
         let mut open = vec![(Below::of(bvh, 0), 0usize, 1usize)];
         while let Some((below, place, depth)) = open.pop() {
             wide.depth = wide.depth.max(depth);
@@ -87,69 +102,50 @@ impl Wide {
             }
             // Large boxes are more likely to block a ray.
             children.sort_by(|a, b| a.is_leaf().cmp(&b.is_leaf()).then(area(b).total_cmp(&area(a))));
-            let boxes: Vec<Aabb<D>> =
-                children.iter().map(|below| grown(&bvh.nodes[below.node].bounds, scale)).collect();
-            let mut node = compressed(&boxes);
-            node.children = wide.nodes.len() as u32;
-            node.simplices = wide.order.len() as u32;
+            let inner = children.iter().take_while(|child| !child.is_leaf()).count();
+            let (first, simplices) = (wide.nodes.len(), wide.order.len());
+            let mut leaves = [0; WIDTH];
             for (lane, child) in children.iter().enumerate() {
+                wide.set_box(place, lane, &bvh.nodes[child.node].bounds, scale, &middle);
                 if child.is_leaf() {
-                    let before = wide.order.len() as u32 - node.simplices;
-                    node.leaves[lane] = (8 * before + child.count) as u8;
+                    leaves[lane] = (8 * (wide.order.len() - simplices)) as u8 + child.count as u8;
                     let range = child.first as usize..(child.first + child.count) as usize;
                     wide.order.extend_from_slice(&bvh.order[range]);
                 } else {
                     open.push((*child, wide.nodes.len(), depth + 1));
-                    wide.nodes.push(Node::default());
-                    node.counts[0] += 1;
+                    wide.add::<D>();
                 }
             }
-            wide.nodes[place] = node;
+            wide.nodes[place] =
+                Node { children: first as u32, simplices: simplices as u32, leaves, inner: inner as u32, padding: 0 };
         }
         wide
     }
-}
 
-/// The box in scaled coordinates, a little larger.
-fn grown<const D: usize>(bounds: &Aabb<D>, scale: &Scale<D>) -> Aabb<D> {
-    Aabb {
-        min: scale.scaled(&bounds.min).map(|x| x.next_down() - GROWTH),
-        max: scale.scaled(&bounds.max).map(|x| x.next_up() + GROWTH),
-    }
-}
-
-/// A side of a box, so many steps from the origin; rounded to nearest.
-fn side(origin: f32, exponent: u8, steps: u8) -> f32 {
-    origin + f32::from(steps) * f32::from_bits(u32::from(exponent) << 23)
-}
-
-/// A node with these boxes, each rounded outwards to the steps of a grid over all of them.
-fn compressed<const D: usize>(boxes: &[Aabb<D>]) -> Node {
-    let all = boxes.iter().fold(Aabb::empty(), |all, one| all.union(one));
-    let mut node = Node { counts: [0, boxes.len() as u8, 0, 0], ..Node::default() };
-    for axis in 0..D {
-        let (origin, end) = (all.min[axis], all.max[axis]);
-        // The smallest step with which a byte reaches the end.
-        let reaches = |exponent: &u8| side(origin, *exponent, u8::MAX) >= end;
-        let least = ((f64::from(end) - f64::from(origin)) / 255.0).log2().floor().clamp(-126.0, 126.0) as i32 + 127;
-        let exponent = (least as u8..=254).find(reaches).unwrap_or(254);
-        let step = f64::from(side(0.0, exponent, 1));
-        let steps = |x: f32| ((f64::from(x) - f64::from(origin)) / step).clamp(0.0, 255.0);
-        node.origin.0[axis] = origin;
-        node.exponents[axis] = exponent;
-        for (lane, one) in boxes.iter().enumerate() {
-            let (mut low, mut high) = (steps(one.min[axis]).floor() as u8, steps(one.max[axis]).ceil() as u8);
-            // The sum was rounded.
-            while low > 0 && side(origin, exponent, low) > one.min[axis] {
-                low -= 1;
-            }
-            while high < u8::MAX && side(origin, exponent, high) < one.max[axis] {
-                high += 1;
-            }
-            (node.sides[axis][0][lane], node.sides[axis][1][lane]) = (low, high);
+    /// A node with eight boxes that no ray meets.
+    fn add<const D: usize>(&mut self) {
+        self.nodes.push(Node::default());
+        for _ in 0..D {
+            self.sides.extend([f32::MAX, f32::MAX, -f32::MAX, -f32::MAX].map(|side| Float4([side; 4])));
         }
     }
-    node
+
+    fn set_box<const D: usize>(
+        &mut self,
+        place: usize,
+        lane: usize,
+        bounds: &Aabb<D>,
+        scale: &Scale<D>,
+        middle: &Vector<D>,
+    ) {
+        let [min, max] = [&bounds.min, &bounds.max].map(|corner| widen(corner) * scale.factor - widen(middle));
+        let sides = &mut self.sides[sides::<D>() * place..][..sides::<D>()];
+        for axis in 0..D {
+            // Both are rounded, by far less than they are grown.
+            sides[4 * axis + lane / 4].0[lane % 4] = (min[axis] - GROWTH) as f32;
+            sides[4 * axis + 2 + lane / 4].0[lane % 4] = (max[axis] + GROWTH) as f32;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -188,15 +184,20 @@ mod tests {
             let node = &wide.nodes[place];
             reached += 1;
             deepest = deepest.max(above.len());
-            let [inner, filled, ..] = node.counts.map(usize::from);
-            assert!(inner <= filled && (1..=8).contains(&filled));
-            for lane in 0..filled {
-                let at = |axis: usize, steps: u8| side(node.origin.0[axis], node.exponents[axis], steps);
+            let sides = &wide.sides[sides::<D>() * place..][..sides::<D>()];
+            let inner = node.inner as usize;
+            for lane in 0..8 {
+                let at = |vector: usize| sides[vector + lane / 4].0[lane % 4];
+                let one = Aabb {
+                    min: Vector::from_fn(|axis, _| at(4 * axis)),
+                    max: Vector::from_fn(|axis, _| at(4 * axis + 2)),
+                };
+                if lane >= inner && node.leaves[lane] == 0 {
+                    assert!(one == Aabb { min: Vector::from_element(f32::MAX), max: Vector::from_element(-f32::MAX) });
+                    continue;
+                }
                 let mut above = above.clone();
-                above.push(Aabb {
-                    min: Vector::from_fn(|axis, _| at(axis, node.sides[axis][0][lane])),
-                    max: Vector::from_fn(|axis, _| at(axis, node.sides[axis][1][lane])),
-                });
+                above.push(one);
                 if lane < inner {
                     open.push((node.children as usize + lane, above));
                     continue;
@@ -205,8 +206,14 @@ mod tests {
                 let held = u32::from(node.leaves[lane] & 7);
                 assert!((1..=MOST).contains(&held));
                 for &item in &wide.order[first..first + held as usize] {
-                    let one = grown(&boxes[item as usize], &scale);
-                    assert!(above.iter().all(|b| b.contains(&one)), "{one:?} in {above:?}");
+                    let one = &boxes[item as usize];
+                    let centred = |corner: &Vector<D>, growth: f64| {
+                        let side = |axis, _| f64::from(corner[axis]) * scale.factor - f64::from(wide.middle.0[axis]);
+                        Vector::<D>::from_fn(|axis, i| (side(axis, i) + growth) as f32)
+                    };
+                    let growth = 0.9 * GROWTH;
+                    let grown = Aabb { min: centred(&one.min, -growth), max: centred(&one.max, growth) };
+                    assert!(above.iter().all(|b| b.contains(&grown)), "{grown:?} in {above:?}");
                 }
             }
         }

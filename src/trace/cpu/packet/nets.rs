@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 
 use crate::geometry::Dimension;
 use crate::trace::groups::LEAST;
-use crate::trace::sampling::sobol;
+use crate::trace::sampling::{along_curve, sobol};
 
 /// Rays of a block; the bits of a `u64` name them.
 pub(super) const BLOCK: usize = 64;
@@ -33,18 +33,9 @@ static NETS: LazyLock<[[Net; 3]; 2]> =
 
 impl Net {
     fn new(blocks: usize, dimension: Dimension) -> Self {
-        let coordinates = dimension.pick(2, 3);
         let count = blocks * BLOCK;
-        // The highest bits of all coordinates, then the next.
-        let place = |index: &u32| {
-            let point: [u32; 3] = std::array::from_fn(|d| sobol(*index, d));
-            let bits = (0..10).flat_map(|level| (0..coordinates).map(move |d| point[d] >> (31 - level) & 1));
-            bits.fold(0u32, |place, bit| place << 1 | bit)
-        };
-        let mut order: Vec<u32> = (0..count as u32).collect();
-        order.sort_by_cached_key(place);
         let (mut points, mut runs) = (vec![[[0; BLOCK]; 3]; blocks], vec![[0; LEAST]; blocks]);
-        for (n, &index) in order.iter().enumerate() {
+        for (n, index) in along_curve(count as u32, dimension).into_iter().enumerate() {
             let (block, i) = (n / BLOCK, n % BLOCK);
             (0..3).for_each(|d| points[block][d][i] = sobol(index, d).reverse_bits());
             runs[block][index as usize / (count / LEAST)] |= 1 << i;
