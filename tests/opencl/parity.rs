@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::on_rays::on_rays;
+use super::on_rays::{on_rays, stars_on_rays};
 use super::smaller;
 use ao4d::accel::Tracer;
 use ao4d::geometry::{Ray, Vector, Vector64};
@@ -215,8 +215,24 @@ fn close_calls<const D: usize>(opencl: &OpenCl) {
             let (mesh, points) = on_rays::<D>(points, simplices, offset, &sampling);
             let tracer = Arc::new(Tracer::new(mesh));
             let slow = ScalarBackend::new(tracer.clone()).open_fractions(&points, &sampling, &Silent).unwrap();
-            let found = OpenClBackend::new(opencl, tracer).open_fractions(&points, &sampling, &Silent).unwrap();
-            assert!(found == slow, "{D}D, {simplices} simplices a point, {offset}, {max_distance}");
+            for sets in [false, true] {
+                let device = OpenClBackend::new(opencl, tracer.clone()).in_sets(sets);
+                let found = device.open_fractions(&points, &sampling, &Silent).unwrap();
+                assert!(found == slow, "{D}D, {simplices} simplices a point, {offset}, {max_distance}, sets: {sets}");
+            }
+        }
+    }
+    for (vertices, samples, offset) in [(4000, 64, 0.0), (300, 1024, 0.0), (500, 64, 700.0)] {
+        let sampling = Sampling::new(samples, 5);
+        let (mesh, points) = stars_on_rays::<D>(vertices, offset, &sampling);
+        let tracer = Arc::new(Tracer::new(mesh));
+        let slow = ScalarBackend::new(tracer.clone()).open_fractions(&points, &sampling, &Silent).unwrap();
+        let open = slow.iter().map(|estimate| estimate.value).sum::<f32>() / slow.len() as f32;
+        assert!((0.02..0.98).contains(&open), "{D}D, {offset}: {open} is open");
+        for sets in [false, true] {
+            let device = OpenClBackend::new(opencl, tracer.clone()).in_sets(sets);
+            let found = device.open_fractions(&points, &sampling, &Silent).unwrap();
+            assert!(found == slow, "{D}D, {vertices} stars, {samples} rays, {offset}, sets: {sets}");
         }
     }
 }

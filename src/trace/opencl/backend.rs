@@ -42,6 +42,13 @@ impl<const D: usize> OpenClBackend<D> {
         Self { opencl, tuning: Tuning::default(), tracer, scale, scene, settled }
     }
 
+    /// The same, with rays traced in sets, as processors want them, or one by one, as graphics processors do; whatever the devices are. For tests.
+    #[doc(hidden)]
+    pub fn in_sets(mut self, sets: bool) -> Self {
+        self.tuning.sets = Some(sets);
+        self
+    }
+
     /// The mesh on the devices; brought there when first asked for.
     pub(super) fn scene(&self) -> Result<&Scene, Error> {
         // Not within `get_or_init`: a thread that waits there for its part of the work takes up other work, and would wait
