@@ -27,9 +27,9 @@ fn interrupted_runs_leave_nothing_behind() {
     let sphere = "hypersphere: {radius: 0.5, subdivisions: 12}";
     let body = "tesseract: {size: 0.5}";
     for (what, shape, sets) in [
-        ("occlusion", sphere, &["ao.samples=16384"][..]),
+        ("occlusion", sphere, &["ao.samples=65536"][..]),
         ("picture", body, &["image.dimensions=[400, 400, 400]", "plain.dimensions=[400, 400, 400]", "ao.samples=1"]),
-        ("voxel", body, &["image.shading=voxel", "image.dimensions=[400, 100, 100]", "ao.samples=1000"]),
+        ("voxel", body, &["image.shading=voxel", "image.dimensions=[400, 100, 100]", "ao.samples=8000"]),
     ] {
         let folder = Folder::with(&PIPELINE.replace(body, shape));
         let arguments: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
