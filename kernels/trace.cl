@@ -310,7 +310,7 @@ __kernel void occluded(
     size_t place = get_global_id(0);
     if (place >= count) return;
     uint number = numbers[place], found = out[number];
-    if (found == HIT) return;
+    if (empty || found == HIT) return;
     uint others = blocked(THE_MESH, points[number / rays], directions[place], limit, false);
     if (others != OPEN) out[number] = (uchar)others;
 }

@@ -275,6 +275,29 @@ fn directions_are_made_there_and_few_rays_are_left_here() {
     assert!(rays.iter().zip(found).all(|(r, f)| f == tracer.closest_hit(r).map_or(u32::MAX, |hit| hit.simplex)));
 }
 
+/// A mesh without any simplex that could be hit.
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn where_there_is_nothing_all_rays_are_open() {
+    let opencl = OpenCl::open(&[]).unwrap();
+    let corner = |x: f64| Vector64::<3>::from_element(x);
+    let surface =
+        Surface { vertices: [0.0, 0.25, 0.5].map(corner).to_vec(), simplices: vec![[0, 1, 2]], normals: None };
+    let mut builder = MeshBuilder::new();
+    builder.add("flat", [0.8; 3], &surface, Orientation::Input).unwrap();
+    let tracer = Arc::new(Tracer::new(builder.finish()));
+    let (position, normal) = (Vector::from_element(0.25), Vector::from_fn(|axis, _| f32::from(axis == 2)));
+    let points: Vec<ShadingPoint<3>> =
+        (0..3).map(|number| ShadingPoint::Inside { position, normal, simplex: 0, number }).collect();
+    for sets in [false, true] {
+        let device = OpenClBackend::new(&opencl, tracer.clone()).in_sets(sets);
+        let found = device.open_fractions(&points, &Sampling::new(100, 5), &Silent).unwrap();
+        assert!(found.iter().all(|estimate| estimate.value == 1.0), "sets: {sets}: {found:?}");
+        let ray = Ray::new(Vector::zeros(), Vector::from_element(0.5));
+        assert_eq!(device.first_hits(&[ray], None, &Silent), Ok(vec![u32::MAX]));
+    }
+}
+
 /// Stops at once.
 struct Stop;
 

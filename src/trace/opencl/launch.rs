@@ -58,7 +58,7 @@ impl<'a, const D: usize> Batch<'a, D> {
 }
 
 /// Memory that the kernels share while they trace a batch.
-struct OnCard<'a> {
+struct Tracing<'a> {
     device: &'a Device,
     kernels: &'a Kernels,
     mesh: &'a MeshCopy,
@@ -69,7 +69,7 @@ struct OnCard<'a> {
     found: &'a Memory<u8>,
 }
 
-impl OnCard<'_> {
+impl Tracing<'_> {
     /// What kernels are told that make directions.
     fn rays<const D: usize>(&self, batch: &Batch<D>) -> [Argument<'_>; 7] {
         [
@@ -211,7 +211,7 @@ impl OnDevice {
         let given: Vec<Float4> = batch.directions.par_iter().map(float4).collect();
         let Room { points, star, given: room, directions, numbers, found, open, unsure, again, .. } = &mut self.room;
         let total = batch.all_rays();
-        let card = OnCard {
+        let tracing = Tracing {
             device,
             kernels: &self.kernels,
             mesh: &self.mesh,
@@ -220,17 +220,17 @@ impl OnDevice {
             given: device.filled(room, &given, "rays")?,
             found: device.room(found, total, "results")?,
         };
-        card.start(batch, directions, numbers)?;
+        tracing.start(batch, directions, numbers)?;
         let (mut is_open, mut is_unsure) = (Bits::new(total), Bits::new(total));
         let words = is_open.0.len();
         let [open, unsure] = [device.room(open, words, "results")?, device.room(unsure, words, "results")?];
-        let arguments = [card.found.argument(), Argument::U64(total as u64), open.argument(), unsure.argument()];
+        let arguments = [tracing.found.argument(), Argument::U64(total as u64), open.argument(), unsure.argument()];
         device.launch(&self.kernels.packed, &arguments, words)?;
         device.read(open, &mut is_open.0)?;
         device.read(unsure, &mut is_unsure.0)?;
         let mut left: Vec<u32> = is_unsure.places().map(|place| place as u32).collect();
         if device.info.double && !left.is_empty() {
-            card.trace_again(batch, again, &mut left, &mut is_open)?;
+            tracing.trace_again(batch, again, &mut left, &mut is_open)?;
         }
         Ok((is_open, left))
     }

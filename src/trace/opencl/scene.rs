@@ -85,7 +85,7 @@ pub(super) struct MeshCopy {
     /// What makes Sobol' points, and where the rays of a point go ([`order`]).
     pub sums: Memory<u32>,
     pub places: Memory<u16>,
-    pub is_empty: bool,
+    is_empty: bool,
 }
 
 /// Room for what launches need and find.
