@@ -275,6 +275,27 @@ fn directions_are_made_there_and_few_rays_are_left_here() {
     assert!(rays.iter().zip(found).all(|(r, f)| f == tracer.closest_hit(r).map_or(u32::MAX, |hit| hit.simplex)));
 }
 
+/// The kernels' boxes are made for origins in the scene; other points are left to the host.
+#[test]
+#[ignore = "needs an OpenCL device: run tests/all"]
+fn points_far_from_the_scene_see_what_the_slow_twin_sees() {
+    let opencl = OpenCl::open(&[]).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let tracer = Arc::new(Tracer::new(soup::<4>(&mut random, 400, 2.0, 0.0, 1.0, 0.0)));
+    let away = |number: u64| {
+        let position = vector::<4>(&mut ChaCha8Rng::seed_from_u64(number), 1.0).normalize().map(|x| 9.0 * x as f32);
+        ShadingPoint::Inside { position, normal: -position.normalize(), simplex: 0, number }
+    };
+    let points: Vec<ShadingPoint<4>> = (0..20).map(away).collect();
+    let sampling = Sampling::new(2048, 5);
+    let slow = ScalarBackend::new(tracer.clone()).open_fractions(&points, &sampling, &Silent).unwrap();
+    assert!(slow.iter().any(|estimate| estimate.value < 1.0));
+    for sets in [false, true] {
+        let device = OpenClBackend::new(&opencl, tracer.clone()).in_sets(sets);
+        assert!(device.open_fractions(&points, &sampling, &Silent).unwrap() == slow, "sets: {sets}");
+    }
+}
+
 /// A mesh without any simplex that could be hit.
 #[test]
 #[ignore = "needs an OpenCL device: run tests/all"]

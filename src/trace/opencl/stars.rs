@@ -131,8 +131,11 @@ impl<const D: usize> OpenClBackend<D> {
                 ..sampled_point(&Frame::new(&normal), &sequence)
             },
             stars_there,
-            // The kernel knows of one simplex that is ignored.
-            serves: serves && ignored.len() <= 1 && is_exact(&self.scale, &position),
+            // The kernel knows of one simplex that is ignored, and its boxes are made for origins in the scene (`wide.rs`).
+            serves: serves
+                && ignored.len() <= 1
+                && is_exact(&self.scale, &position)
+                && self.scale.centred(&position).amax() <= 0.51,
         }
     }
 }
